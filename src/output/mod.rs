@@ -4,6 +4,7 @@
 //! history) grows by one row per write. A failure names the file and leaves the simulation alone.
 
 mod history;
+pub mod variables;
 mod vtu;
 
 pub use history::History;
