@@ -21,16 +21,16 @@ impl History {
     ///
     /// # Errors
     /// [`Code::Io`](crate::Code::Io) naming the file.
-    pub fn create<'a>(
+    pub fn create(
         path: impl Into<PathBuf>,
-        columns: impl IntoIterator<Item = &'a str>,
+        columns: impl IntoIterator<Item: AsRef<str>>,
     ) -> Result<Self> {
         let path = path.into();
         let mut header = String::from("time");
         let mut count = 0;
         for name in columns {
             header.push(',');
-            header.push_str(&quoted(name));
+            header.push_str(&quoted(name.as_ref()));
             count += 1;
         }
         header.push('\n');

@@ -4,10 +4,12 @@
 //! history) grows by one row per write. A failure names the file and leaves the simulation alone.
 
 mod history;
+mod recorder;
 pub mod variables;
 mod vtu;
 
 pub use history::History;
+pub use recorder::Recorder;
 pub use vtu::{Collection, write_vtu};
 
 use std::ffi::OsString;
