@@ -6,6 +6,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 plt.rcParams.update(
     {
@@ -24,45 +25,78 @@ plt.rcParams.update(
 ALONE, COUPLED, DAMPER, HEAT, SCHEME = "#8c8c8c", "#1f5fa8", "#d9822b", "#b5402f", "#c9c9c9"
 
 
-def surface(points):
-    """Which particles of a box lie on its surface."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    return ((points < low + 1e-9) | (points > high - 1e-9)).any(axis=1)
+def surface(initial):
+    """The surface of a box of lattice particles as quadrilaterals: (faces, 4) particle indices."""
+    places = [np.unique(initial[:, axis].round(9), return_inverse=True)[1] for axis in range(3)]
+    lattice = np.empty([place.max() + 1 for place in places], dtype=int)
+    lattice[tuple(places)] = np.arange(len(initial))
+    quads = []
+    for axis in range(3):
+        for side, turn in ((0, -1), (-1, 1)):
+            face = np.take(lattice, side, axis=axis)
+            corners = np.stack([face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]], axis=-1)
+            # Counter-clockwise seen from outside, so that the shading falls on the right side.
+            outward = turn if axis != 1 else -turn
+            quads.append(corners.reshape(-1, 4)[:, ::outward])
+    return np.concatenate(quads)
+
+
+def upright(points):
+    """From the scene, where y is up, to the picture, where z is up."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    return np.stack([x, -z, y], axis=-1)
 
 
 def snapshots(path, alone, coupled, field, times=(0.5, 1.4, 2.3, 3.2, 4.1, 5.0), interval=0.1):
-    """The two columns at several times, coloured by a stress; the damper as a ball on a spring."""
+    """The two columns at several times, coloured by a stress [Pa]; the damper as a ball on a spring."""
     index = [round(time / interval) for time in times]
-    scale = max(np.quantile(alone[k][field], 0.995) for k in index) / 1e6
-    figure = plt.figure(figsize=(11, 6.4))
+    most = max(np.quantile(alone[k][field], 0.995) for k in index) / 1e6
+    colours = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(0, most), "viridis")
+    light = matplotlib.colors.LightSource(azdeg=195, altdeg=35)
+    quads = surface(alone[0]["initial"])
+    figure = plt.figure(figsize=(11, 5.0))
     for row, frames in enumerate((alone, coupled)):
         for column, k in enumerate(index):
             frame = frames[k]
             axes = figure.add_axes(
-                [0.045 + column * 0.143, 0.5 - row * 0.44, 0.143, 0.43], projection="3d", computed_zorder=False
+                [0.035 + column * 0.146, 0.5 - row * 0.475, 0.15, 0.42],
+                projection="3d",
+                proj_type="ortho",
+                computed_zorder=False,
             )
-            shown = surface(frame["initial"])
-            x, y, z = frame["points"][shown].T
-            dots = axes.scatter(
-                x, z, y, c=frame[field][shown] / 1e6, s=9, vmin=0, vmax=scale, cmap="viridis", linewidths=0, depthshade=False
+            ground = np.array([[-1.6, -1.3, 0], [1.6, -1.3, 0], [1.6, 1.3, 0], [-1.6, 1.3, 0]])
+            axes.add_collection3d(Poly3DCollection([ground], facecolors="#ececec", edgecolors="#c4c4c4", clip_on=False))
+            stress = frame[field][quads].mean(axis=1) / 1e6
+            axes.add_collection3d(
+                Poly3DCollection(
+                    upright(frame["points"])[quads],
+                    facecolors=colours.to_rgba(stress),
+                    edgecolors=(0, 0, 0, 0.18),
+                    linewidths=0.25,
+                    shade=True,
+                    lightsource=light,
+                    clip_on=False,
+                )
             )
             if "mass" in frame:
-                top = frame["points"][frame["initial"][:, 1] > 6 - 1e-9].mean(axis=0)
-                mass = np.array([0, 6, 0]) + frame["mass"]
-                spring = np.linspace(top, mass, 2)
-                axes.plot(spring[:, 0], spring[:, 2], spring[:, 1], color=DAMPER, linewidth=1.2)
-                axes.scatter(*mass[[0, 2, 1]], s=70, color=DAMPER, edgecolors="black", linewidths=0.6, depthshade=False)
-            axes.set(xlim=(-4, 4), ylim=(-1, 1), zlim=(0, 7))
-            axes.set_box_aspect((8, 2, 7), zoom=1.55)
-            axes.set_proj_type("ortho")
-            axes.view_init(elev=12, azim=-78)
+                top = frame["initial"][:, 1] > frame["initial"][:, 1].max() - 1e-9
+                centre = upright(frame["points"][top].mean(axis=0))
+                mass = upright(frame["initial"][top].mean(axis=0) + frame["mass"])
+                axes.plot(*np.transpose([centre, mass]), color=DAMPER, linewidth=1.6)
+                axes.scatter(*mass, s=75, color=DAMPER, edgecolors="black", linewidths=0.7, depthshade=False)
+            axes.set(xlim=(-3.6, 3.6), ylim=(-1.3, 1.3), zlim=(-0.1, 6.9))
+            axes.set_box_aspect((7.2, 2.6, 7), zoom=1.62)
+            axes.view_init(elev=14, azim=-70)
             axes.set_axis_off()
+            axes.patch.set_alpha(0)
             if row == 0:
-                axes.set_title(f"t = {times[column]:.1f} s", y=0.98)
-    figure.text(0.02, 0.71, "column alone", rotation=90, va="center", ha="center", fontsize=11)
-    figure.text(0.02, 0.27, "with damper", rotation=90, va="center", ha="center", fontsize=11)
-    bar = figure.colorbar(dots, cax=figure.add_axes([0.93, 0.2, 0.014, 0.6]), extend="max")
+                left, bottom, width, height = axes.get_position().bounds
+                figure.text(left + width / 2, 0.945, f"t = {times[column]:.1f} s", ha="center")
+    figure.text(0.02, 0.7, "column alone", rotation=90, va="center", ha="center", fontsize=11)
+    figure.text(0.02, 0.23, "with damper", rotation=90, va="center", ha="center", fontsize=11)
+    bar = figure.colorbar(colours, cax=figure.add_axes([0.93, 0.15, 0.013, 0.7]), extend="max")
     bar.set_label("von Mises stress [MPa]")
+    bar.ax.grid(False)
     figure.savefig(path)
     plt.close(figure)
 
