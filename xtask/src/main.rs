@@ -1,6 +1,7 @@
 //! The project's tasks: `cargo xtask <task>`.
 
 mod demo;
+mod output_tests;
 mod project;
 mod tally;
 mod test;

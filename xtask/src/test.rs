@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::output_tests::output_tests;
 use crate::tally::Tally;
 
 /// A part of the tests: what it is called and how it is run.
@@ -16,6 +17,7 @@ const PARTS: &[Part] = &[
     ("lints", lints),
     ("documentation", documentation),
     ("rust", rust),
+    ("output files", output_tests),
 ];
 
 pub fn test(sh: &Shell) -> Result<()> {
