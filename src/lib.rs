@@ -3,6 +3,7 @@
 pub mod error;
 pub mod fields;
 pub mod ledger;
+pub mod output;
 pub mod scene;
 mod simulation;
 

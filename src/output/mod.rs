@@ -1,0 +1,3 @@
+//! What a run reports and writes.
+
+pub mod variables;
