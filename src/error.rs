@@ -88,6 +88,11 @@ impl Error {
     pub fn place(&self) -> &Place {
         &self.place
     }
+    /// Adds a note in parentheses to the message.
+    pub fn with_note(mut self, note: &str) -> Self {
+        self.message = format!("{} ({note})", self.message);
+        self
+    }
     /// Adds the JSON path.
     pub fn at_path(mut self, path: impl Into<String>) -> Self {
         self.place.path = Some(path.into());

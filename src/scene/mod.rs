@@ -3,16 +3,25 @@
 //! [`Scene::from_json`] parses, applies overrides and validates; every error names the JSON path.
 //! The types here are the schema: `urlsph schema` prints them as a JSON Schema.
 
+mod expression;
+mod parse;
+mod schema;
+mod validate;
 mod value;
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::{Deserialize, Deserializer, Serialize, de};
 
-pub use value::{Scalar, Table, Vector};
+pub use expression::Expression;
+pub use schema::json_schema;
+pub use value::{Interpolation, Scalar, ScalarFunction, Table, Vector, VectorFunction};
 
-use crate::error::Result;
+use crate::error::{Code, Error, Result};
 
 /// A whole scene. All values in SI units; positions in the initial configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -73,7 +82,7 @@ pub struct BoxGeometry {
 }
 
 /// One spacing for all axes, or one per axis [m].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Spacing {
     /// The same for all axes.
@@ -234,7 +243,7 @@ impl Default for Numerics {
 }
 
 /// 6, 18 or 26 lattice neighbours, or `{"radius": r}`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Neighbours {
     /// 6, 18 or 26 neighbours that share a lattice cell.
@@ -325,13 +334,121 @@ pub struct Output {
     pub fields: Option<Vec<String>>,
 }
 
+impl<'de> Deserialize<'de> for Spacing {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> de::Visitor<'de> for Visitor {
+            type Value = Spacing;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, or a list of three numbers, one per axis")
+            }
+            value::visit_numbers!(Spacing::Uniform);
+            fn visit_seq<A: de::SeqAccess<'de>>(
+                self,
+                seq: A,
+            ) -> std::result::Result<Spacing, A::Error> {
+                Deserialize::deserialize(SeqAccessDeserializer::new(seq)).map(Spacing::PerAxis)
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+impl<'de> Deserialize<'de> for Neighbours {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Radius {
+            radius: f64,
+        }
+        struct Visitor;
+        impl<'de> de::Visitor<'de> for Visitor {
+            type Value = Neighbours;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(r#"6, 18, 26 or {"radius": r}"#)
+            }
+            fn visit_u64<E: de::Error>(self, v: u64) -> std::result::Result<Neighbours, E> {
+                u8::try_from(v)
+                    .map(Neighbours::Lattice)
+                    .map_err(|_| E::invalid_value(de::Unexpected::Unsigned(v), &self))
+            }
+            fn visit_map<A: de::MapAccess<'de>>(
+                self,
+                map: A,
+            ) -> std::result::Result<Neighbours, A::Error> {
+                let Radius { radius } = Radius::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(Neighbours::Radius { radius })
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+impl Spacing {
+    /// One spacing per axis [m].
+    pub fn per_axis(self) -> [f64; 3] {
+        match self {
+            Spacing::Uniform(h) => [h; 3],
+            Spacing::PerAxis(h) => h,
+        }
+    }
+}
+
+impl Geometry {
+    /// The boxes, by name; a single box has none.
+    pub fn boxes(&self) -> Vec<(Option<&str>, &BoxGeometry)> {
+        match self {
+            Geometry::Box(only) => vec![(None, only)],
+            Geometry::Boxes(boxes) => boxes.iter().map(|(n, b)| (Some(n.as_str()), b)).collect(),
+        }
+    }
+
+    /// Names of the faces, box by box: each is a patch.
+    pub fn faces(&self) -> Vec<String> {
+        self.boxes()
+            .into_iter()
+            .flat_map(|(name, _)| {
+                ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"].map(|face| match name {
+                    Some(name) => format!("{name}.{face}"),
+                    None => face.to_owned(),
+                })
+            })
+            .collect()
+    }
+}
+
 impl Scene {
-    /// Parses and validates a scene; `overrides` are `path=value` texts applied to the JSON first.
+    /// Parses and validates a scene; `overrides` are `path=value` texts applied to the JSON first,
+    /// such as `geometry.box.spacing=0.125` or `boundary.top.traction[1]=5e3`. A value is JSON, or a
+    /// text that stands for itself. A key that contains dots is written `boundary["leg.y_max"]` if it
+    /// is not in the JSON yet.
     ///
     /// # Errors
-    /// [`Code::Parse`](crate::Code::Parse) or [`Code::InvalidScene`](crate::Code::InvalidScene), with the JSON path.
+    /// [`Code::Parse`](crate::Code::Parse) or [`Code::InvalidScene`](crate::Code::InvalidScene), with the JSON path;
+    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) for an override that has no place in the JSON;
+    /// [`Code::OutOfMemory`](crate::Code::OutOfMemory) for more particles than this machine can hold.
     pub fn from_json(text: &str, overrides: &[String]) -> Result<Self> {
-        let _ = (text, overrides);
-        todo!()
+        let scene = parse::parse(text, overrides)?;
+        scene
+            .validate()
+            .map_err(|e| parse::with_override(e, overrides))?;
+        Ok(scene)
+    }
+
+    /// Reads, parses and validates a scene file; see [`from_json`](Self::from_json).
+    ///
+    /// # Errors
+    /// [`Code::Io`](crate::Code::Io) if the file cannot be read, otherwise as [`from_json`](Self::from_json);
+    /// the message names the file.
+    pub fn from_file(path: impl AsRef<Path>, overrides: &[String]) -> Result<Self> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            Error::new(
+                Code::Io,
+                format!("the scene {} cannot be read: {e}", path.display()),
+            )
+        })?;
+        Self::from_json(&text, overrides)
+            .map_err(|e| e.with_note(&format!("in {}", path.display())))
     }
 }
