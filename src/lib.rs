@@ -2,6 +2,10 @@
 
 pub mod error;
 pub mod fields;
+#[cfg(feature = "fmi")]
+#[allow(unsafe_code)] // The C functions of FMI.
+#[path = "../fmu/mod.rs"]
+pub mod fmu;
 pub mod ledger;
 pub mod output;
 pub mod scene;
