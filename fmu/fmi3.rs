@@ -53,7 +53,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     resources: Text,
     _visible: Boolean,
     logging: Boolean,
-    event_mode: Boolean,
+    _event_mode: Boolean,
     _early_return: Boolean,
     _intermediate: *const Reference,
     intermediate_count: usize,
@@ -61,13 +61,9 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     log: Option<Logger3>,
     _update: Pointer,
 ) -> Pointer {
-    let refusal = if event_mode != 0 {
-        Some("this FMU has no event mode: instantiate it with eventModeUsed false")
-    } else if intermediate_count != 0 {
-        Some("this FMU has no intermediate update: require no intermediate variables")
-    } else {
-        None
-    };
+    // Some importers allow event mode and early return to every FMU; there is no harm in that.
+    let refusal = (intermediate_count != 0)
+        .then_some("this FMU has no intermediate update: require no intermediate variables");
     let logger = log.map_or(Logger::None, |f| Logger::V3(f, environment));
     // SAFETY: by the standard.
     unsafe {

@@ -192,7 +192,7 @@ impl Instance {
         // Importers compute the point by sums or products: it may differ by round-off.
         let now = self.time();
         let slack = 1e-9 * step + 8.0 * f64::EPSILON * now.abs().max(point.abs());
-        if !((point - now).abs() <= slack) {
+        if !point.is_finite() || (point - now).abs() > slack {
             return Err(Error::argument(format!(
                 "the communication point is {point} s, but the last step ended at {now} s: \
                  continue there, or set an earlier FMU state first"
