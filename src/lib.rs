@@ -35,6 +35,10 @@
 mod boundary;
 pub mod error;
 pub mod fields;
+#[cfg(feature = "fmi")]
+#[allow(unsafe_code)] // The C functions of FMI.
+#[path = "../fmu/mod.rs"]
+pub mod fmu;
 mod formulation;
 mod integrator;
 mod kernel;
