@@ -1,6 +1,7 @@
 //! Large-strain solid dynamics by Updated Reference Lagrangian SPH.
 
 pub mod error;
+pub mod ffi;
 pub mod fields;
 pub mod ledger;
 pub mod output;
