@@ -2,6 +2,7 @@
 
 mod demo;
 mod header;
+mod install;
 mod project;
 mod tally;
 mod test;
@@ -19,6 +20,7 @@ Tasks:
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
   header      Generate include/urlsph.h; with --check only see whether it is up to date
+  install     --prefix DIR [--destdir DIR]: library, headers, pkg-config and CMake files
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
   validate    The long comparisons with reference solutions, with residuals and tolerances
 ";
@@ -41,6 +43,7 @@ fn run(arguments: &[String]) -> Result<()> {
         ["demo"] => demo::demo(&sh),
         ["header"] => header::header(&sh, false),
         ["header", "--check"] => header::header(&sh, true),
+        ["install", arguments @ ..] => install::install(&sh, arguments),
         ["test"] => test::test(&sh),
         ["validate"] => validate::validate(&sh),
         [] | ["help" | "-h" | "--help"] => {
