@@ -18,7 +18,6 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
-#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -69,13 +68,12 @@ private:
     std::optional<double> time_;
 };
 
-/// Read-only contiguous values that somebody else owns: a vector, an array, a list in braces, or a
-/// pointer and a size. To be used as a parameter, for the time of a call.
+/// Read-only contiguous values that somebody else owns: a vector, an array, or a pointer and a size.
+/// To be used as a parameter, for the time of a call.
 template <class T>
 class Span {
 public:
     Span(const T* data, std::size_t size) noexcept : data_(data), size_(size) {}
-    Span(std::initializer_list<T> list) noexcept : data_(list.begin()), size_(list.size()) {}
     template <class Container,
               class = std::enable_if_t<std::is_convertible_v<
                   decltype(std::declval<const Container&>().data()), const T*>>>
@@ -242,13 +240,25 @@ public:
         values.resize(count);
         return values;
     }
+    /// Sets a traction [Pa], one for the patch.
+    void set_traction(std::size_t patch, const std::array<double, 3>& value) {
+        set_traction(patch, Span<double>(value));
+    }
     /// Sets a traction [Pa]: 3 numbers, or 3 per particle of the patch.
     void set_traction(std::size_t patch, Span<double> values) {
         check(urlsph_set_traction(handle_, patch, values.data(), values.size()));
     }
+    /// Sets a pressure [Pa], one for the patch.
+    void set_pressure(std::size_t patch, double value) {
+        set_pressure(patch, Span<double>(&value, 1));
+    }
     /// Sets a pressure [Pa]: 1 number, or 1 per particle of the patch.
     void set_pressure(std::size_t patch, Span<double> values) {
         check(urlsph_set_pressure(handle_, patch, values.data(), values.size()));
+    }
+    /// Sets a velocity [m/s], one for the patch.
+    void set_velocity(std::size_t patch, const std::array<double, 3>& value) {
+        set_velocity(patch, Span<double>(value));
     }
     /// Sets a velocity [m/s]: 3 numbers, or 3 per particle of the patch.
     void set_velocity(std::size_t patch, Span<double> values) {

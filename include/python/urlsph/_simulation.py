@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import json
 import os
 import signal
@@ -475,11 +474,13 @@ class Simulation:
         """Advances by ``dt`` [s], in as many stable steps as needed, and ends exactly there."""
         with self._callbacks.interruptible():
             self._change(lib.urlsph_step, dt)
+        self._callbacks.raise_again()
 
     def advance_to(self, time: float) -> None:
         """Advances to ``time`` [s], in as many stable steps as needed, and ends exactly there."""
         with self._callbacks.interruptible():
             self._change(lib.urlsph_advance_to, time)
+        self._callbacks.raise_again()
 
     # Patches.
 
