@@ -3,7 +3,7 @@
 use super::args::{array, buffer, put};
 use super::handle::with;
 use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
-use crate::simulation::Snapshot;
+use crate::snapshot::Snapshot;
 
 /// Bytes that a snapshot of the present state takes.
 ///
