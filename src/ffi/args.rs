@@ -89,12 +89,12 @@ pub(super) unsafe fn put<T>(pointer: *mut T, value: T, name: &str) -> Result<()>
 /// # Safety
 /// All zeros, and any bytes that a C compiler can put there, are a value of the type.
 pub(super) unsafe trait Versioned: Copy {
-    /// Offset of the last field of the first version: no caller's struct ends before it.
-    const LAST_OF_FIRST_VERSION: usize;
+    /// Size of the first version: no caller's struct is smaller.
+    const FIRST_SIZE: usize;
 }
 
 fn check_size<T: Versioned>(size: usize, name: &str) -> Result<()> {
-    if size > T::LAST_OF_FIRST_VERSION {
+    if size >= T::FIRST_SIZE {
         return Ok(());
     }
     Err(Error::argument(format!(

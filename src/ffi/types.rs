@@ -336,13 +336,18 @@ pub struct urlsph_probe_motion {
     pub velocity: [f64; 3],
 }
 
+const fn size_of_field<S, F>(_: fn(&S) -> &F) -> usize {
+    size_of::<F>()
+}
+
 /// The last field of each struct in the first version of the ABI: this list only grows.
 macro_rules! versioned {
     ($($name:ident . $last:ident;)*) => {$(
         // SAFETY: numbers, arrays of numbers, raw pointers and optional function pointers take any
         // bytes. The structs with an enum are only written, never read from the caller.
         unsafe impl Versioned for $name {
-            const LAST_OF_FIRST_VERSION: usize = offset_of!($name, $last);
+            const FIRST_SIZE: usize =
+                offset_of!($name, $last) + size_of_field(|s: &$name| &s.$last);
         }
     )*};
 }
