@@ -30,8 +30,8 @@ from damper import Damper
 
 HERE = Path(__file__).parent
 
-# Communication step [s]: about 10 stable steps of the column, 1/180 of its swing.
-STEP = 0.01
+# Communication step [s]: 1/370 of the column's swing, and a handful of its stable steps.
+STEP = 0.005
 
 # The column's first bending mode, 1.84 s (a quarter of a swing lasts 0.46 s), moves the top like
 # about a quarter of the column's 6600 kg would. A damper of 400 kg is a fourth of that: heavy for

@@ -54,7 +54,7 @@ def snapshots(path, alone, coupled, field, times=(0.5, 1.4, 2.3, 3.2, 4.1, 5.0),
     colours = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(0, most), "viridis")
     light = matplotlib.colors.LightSource(azdeg=195, altdeg=35)
     quads = surface(alone[0]["initial"])
-    figure = plt.figure(figsize=(11, 5.0))
+    figure = plt.figure(figsize=(11, 4.7))
     for row, frames in enumerate((alone, coupled)):
         for column, k in enumerate(index):
             frame = frames[k]
@@ -85,7 +85,7 @@ def snapshots(path, alone, coupled, field, times=(0.5, 1.4, 2.3, 3.2, 4.1, 5.0),
                 axes.plot(*np.transpose([centre, mass]), color=DAMPER, linewidth=1.6)
                 axes.scatter(*mass, s=75, color=DAMPER, edgecolors="black", linewidths=0.7, depthshade=False)
             axes.set(xlim=(-3.6, 3.6), ylim=(-1.3, 1.3), zlim=(-0.1, 6.9))
-            axes.set_box_aspect((7.2, 2.6, 7), zoom=1.62)
+            axes.set_box_aspect((7.2, 2.6, 7), zoom=1.48)
             axes.view_init(elev=14, azim=-70)
             axes.set_axis_off()
             axes.patch.set_alpha(0)
