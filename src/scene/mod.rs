@@ -251,6 +251,13 @@ impl Default for Numerics {
     }
 }
 
+impl Numerics {
+    /// The CFL number: the scene's, or the largest that is proven stable for its neighbours.
+    pub fn cfl_number(&self) -> f64 {
+        self.cfl.unwrap_or(if self.neighbours == Neighbours::Lattice(6) { 0.6 } else { 0.9 })
+    }
+}
+
 /// 6, 18 or 26 lattice neighbours, or `{"radius": r}`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields)]
