@@ -46,7 +46,7 @@ impl Run {
         let outcome = march(&mut simulation, &mut recorder, &bar, &interrupted);
         bar.finish();
         if let Err(error) = outcome {
-            return Err(self.explain(error, &simulation, &mut recorder));
+            return Err(Self::explain(error, &simulation, &mut recorder));
         }
         if !self.quiet {
             crate::print(&summary(&simulation, &recorder, initial, start.elapsed()))?;
@@ -54,25 +54,18 @@ impl Run {
         Ok(())
     }
 
-    /// What became of a run that ended early: writes its last state and adds what can be done.
-    fn explain(&self, error: Error, simulation: &Simulation, recorder: &mut Recorder) -> Error {
-        let advice = match error.code() {
-            Code::Diverged => {
-                "try a smaller `numerics.cfl`, `numerics.dissipation=true`, a smaller \
-                 `geometry` spacing, or gentler loads"
-            }
-            Code::Cancelled => "what was written up to now is whole and can be read",
-            _ => return error,
-        };
+    /// What became of a run that ended early: its last state is written, and the message says where.
+    fn explain(error: Error, simulation: &Simulation, recorder: &mut Recorder) -> Error {
+        if !matches!(error.code(), Code::Diverged | Code::Cancelled) {
+            return error;
+        }
         match recorder.record_last_state(simulation) {
             Ok(path) => error.with_note(&format!(
-                "the last good state, time {:.6e} s, is in {}; {advice}",
+                "the last good state, time {:.6e} s, is in {}",
                 simulation.time(),
                 path.display()
             )),
-            Err(output) => error.with_note(&format!(
-                "the last good state could not be written: {output}; {advice}"
-            )),
+            Err(output) => error.with_note(&format!("its last good state is lost, too: {output}")),
         }
     }
 }
