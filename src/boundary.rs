@@ -585,7 +585,7 @@ struct Constraint {
 }
 
 fn axes(set: [bool; 3]) -> Vec<[f64; 3]> {
-    let unit = identity::<f64>();
+    let unit = IDENTITY;
     (0..3).filter(|c| set[*c]).map(|c| unit[c]).collect()
 }
 

@@ -574,7 +574,7 @@ impl Simulation {
     fn field_at(&self, field: Field, slot: usize, force: Option<&Array<3>>) -> [f64; 9] {
         let vector = |v: [f64; 3]| [v[0], v[1], v[2], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         let scalar = |s: f64| vector([s, 0.0, 0.0]);
-        let tensor = |t: &Mat3<f64>| *t.as_flattened().first_chunk().expect("nine components");
+        let tensor = flat;
         let (x, x_initial) = (self.state.x.get(slot), self.reference.x_initial.get(slot));
         match field {
             Field::InitialPosition => return vector(x_initial),
@@ -595,7 +595,7 @@ impl Simulation {
             Field::CauchyStress => tensor(&point.cauchy),
             Field::Pressure => scalar(-trace / 3.0),
             Field::VonMisesStress => {
-                let deviator = axpy9(&point.cauchy, -trace / 3.0, &identity());
+                let deviator = axpy9(&point.cauchy, -trace / 3.0, &IDENTITY);
                 scalar((1.5 * double_dot(&deviator, &deviator)).sqrt())
             }
             Field::StrainEnergyDensity => scalar(point.energy),

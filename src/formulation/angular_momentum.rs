@@ -33,7 +33,7 @@ pub fn project(
     };
     let slots = |slab: usize| {
         let (first, slices) = layout.slab_range(slab);
-        let end = (first + slices * crate::lane::WIDTH).min(Layout::slot(layout.particles));
+        let end = (first + slices * crate::lane::SLICE).min(Layout::slot(layout.particles));
         first..end
     };
     let slabs = || (0..layout.slabs()).collect::<Vec<_>>();

@@ -59,8 +59,8 @@ pub fn jump<T: Lane, const MODE: u8>(pair: &Pair<T>, half_a: Vec3<T>, half_b: Ve
 pub fn dissipation<T: Lane>(pair: &Pair<T>, jump: Vec3<T>, speeds: WaveSpeeds<T>) -> Vec3<T> {
     let norm = dot(pair.area, pair.area).sqrt();
     // One division for the mean wave speed and for n (x) n; dummies have dx = 0 and no area.
-    let inverse = T::splat(0.5) * pair.density * norm
-        / pair.stretch.mul_add(pair.dx2, T::splat(f64::MIN_POSITIVE));
+    let inverse = norm.of(0.5) * pair.density * norm
+        / pair.stretch.mul_add(pair.dx2, norm.of(f64::MIN_POSITIVE));
     let along = (speeds.pressure - speeds.shear) * dot(pair.dx, jump);
     scale3(inverse, axpy3(scale3(speeds.shear * pair.dx2, jump), along, pair.dx))
 }
@@ -70,5 +70,5 @@ pub fn dissipation<T: Lane>(pair: &Pair<T>, jump: Vec3<T>, speeds: WaveSpeeds<T>
 #[inline(always)]
 pub fn volume_dissipation<T: Lane>(pair: &Pair<T>, jump: T, pressure_speed: T, coefficient: T) -> T {
     let norm = dot(pair.area, pair.area).sqrt();
-    coefficient * T::splat(0.5) * norm * pair.stretch / (pair.density * pressure_speed) * jump
+    coefficient * norm.of(0.5) * norm * pair.stretch / (pair.density * pressure_speed) * jump
 }

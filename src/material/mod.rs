@@ -145,7 +145,7 @@ mod tests {
             let h = cofactor(f);
             law.stress(f, &h, dot(f[0], h[0]))
         };
-        let rest = all(&identity());
+        let rest = all(&IDENTITY);
         assert!(double_dot(&rest.p, &rest.p).sqrt() < 1e-9 * moduli.mu);
         assert!(rest.energy.abs() < 1e-9 * moduli.mu);
         let f = [[1.2, 0.3, -0.1], [0.05, 0.8, 0.2], [-0.2, 0.1, 1.1]];
