@@ -12,10 +12,9 @@ use crate::lane::Lane;
 /// Lanes with r = 0 give a value that is not finite: the caller masks them.
 #[inline(always)]
 pub fn slope<T: Lane>(r: T, h: T) -> T {
-    let s = T::splat;
-    let a = s(5.0 / (4.0 * PI)) / (h * h * h);
-    let shape = (s(0.75) - s(0.375) * r / h) / (h * r);
-    (a * shape).max(s(0.0))
+    let a = h.of(5.0 / (4.0 * PI)) / (h * h * h);
+    let shape = (h.of(0.75) - h.of(0.375) * r / h) / (h * r);
+    (a * shape).max(h.of(0.0))
 }
 
 #[cfg(test)]

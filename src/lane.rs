@@ -1,29 +1,38 @@
 //! Lanes: a law or a pair term is written once over [`Lane`] and runs on one particle (`f64`) or on
-//! eight neighbouring slots at a time ([`F64x8`]), with the same bits.
+//! as many neighbouring slots as a vector register holds ([`Wide`]), with the same bits.
 //!
 //! The instruction set is chosen at run time ([`vectorised`]); every operation here is exactly
 //! rounded, fused multiply-adds included, so the choice does not change a result.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Slots in a slice.
-pub const WIDTH: usize = 8;
+use pulp::Simd;
 
-/// One value, or one value per slot of a slice.
+/// Slots in a slice: a multiple of every vector width.
+pub const SLICE: usize = 8;
+
+/// Storage of one component of a slice.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
+pub struct Slots(pub [f64; SLICE]);
+
+/// One value, or one value per slot of (a part of) a slice.
 pub trait Lane:
     Copy
-    + Send
-    + Sync
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
     + Neg<Output = Self>
 {
+    /// Proof that the processor has the instructions; needed to make a value.
+    type Token: Copy + Send + Sync;
     /// Particles per value.
     const WIDTH: usize;
+    /// The proof that came with this value.
+    fn token(self) -> Self::Token;
     /// The same in every lane.
-    fn splat(value: f64) -> Self;
+    fn splat(token: Self::Token, value: f64) -> Self;
     /// `self * a + b`, rounded once.
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// Square root.
@@ -34,22 +43,28 @@ pub trait Lane:
     fn max(self, other: Self) -> Self;
     /// `yes` where `self > 0`, else `no`.
     fn if_positive(self, yes: Self, no: Self) -> Self;
-    /// First guess of `self^(-1/3)` for positive values, within 4 %.
-    fn inverse_cbrt_guess(self) -> Self;
     /// Reads from `from[at..]`.
-    fn load(from: &[f64], at: usize) -> Self;
+    fn load(token: Self::Token, from: &[f64], at: usize) -> Self;
     /// Writes to `to[at..]`.
     fn store(self, to: &mut [f64], at: usize);
-    /// The lanes, padded with the first.
-    fn lanes(self) -> [f64; WIDTH];
+    /// Calls `each(lane, value)` in the order of the lanes.
+    fn for_lanes(self, each: impl FnMut(usize, f64));
+    /// First guess of `self^(-1/3)` for positive values, within 4 %.
+    fn inverse_cbrt_guess(self) -> Self;
+
+    /// The same in every lane, in the company of this value.
+    #[inline(always)]
+    fn of(self, value: f64) -> Self {
+        Self::splat(self.token(), value)
+    }
 
     /// `self^(-1/3)` for positive values: Newton's iteration for y^-3 = x.
     #[inline(always)]
     fn inverse_cbrt(self) -> Self {
         let mut y = self.inverse_cbrt_guess();
         for _ in 0..4 {
-            let residual = Self::splat(1.0) - self * y * (y * y);
-            y = (y * Self::splat(1.0 / 3.0)).mul_add(residual, y);
+            let residual = self.of(1.0) - self * y * (y * y);
+            y = (y * self.of(1.0 / 3.0)).mul_add(residual, y);
         }
         y
     }
@@ -64,9 +79,12 @@ fn inverse_cbrt_guess(x: f64) -> f64 {
 }
 
 impl Lane for f64 {
+    type Token = ();
     const WIDTH: usize = 1;
     #[inline(always)]
-    fn splat(value: f64) -> Self {
+    fn token(self) {}
+    #[inline(always)]
+    fn splat((): (), value: f64) -> Self {
         value
     }
     #[inline(always)]
@@ -90,11 +108,7 @@ impl Lane for f64 {
         if self > 0.0 { yes } else { no }
     }
     #[inline(always)]
-    fn inverse_cbrt_guess(self) -> Self {
-        inverse_cbrt_guess(self)
-    }
-    #[inline(always)]
-    fn load(from: &[f64], at: usize) -> Self {
+    fn load((): (), from: &[f64], at: usize) -> Self {
         from[at]
     }
     #[inline(always)]
@@ -102,128 +116,164 @@ impl Lane for f64 {
         to[at] = self;
     }
     #[inline(always)]
-    fn lanes(self) -> [f64; WIDTH] {
-        [self; WIDTH]
+    fn for_lanes(self, mut each: impl FnMut(usize, f64)) {
+        each(0, self);
+    }
+    #[inline(always)]
+    fn inverse_cbrt_guess(self) -> Self {
+        inverse_cbrt_guess(self)
     }
 }
 
-/// Eight slots.
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(64))]
-pub struct F64x8(pub [f64; WIDTH]);
-
-// Plain loops over the eight lanes: the compiler turns each into one or two vector instructions in
-// the context of `vectorised`, and never leaves that context as a closure might.
-macro_rules! lanewise {
-    (|$i:ident| $value:expr) => {{
-        let mut out = [0.0; WIDTH];
-        for $i in 0..WIDTH {
-            out[$i] = $value;
-        }
-        F64x8(out)
-    }};
+/// A vector register.
+#[derive(Clone, Copy)]
+pub struct Wide<S: Simd> {
+    simd: S,
+    value: S::f64s,
 }
 
 macro_rules! operator {
-    ($trait:ident $method:ident $op:tt) => {
-        impl $trait for F64x8 {
+    ($trait:ident $method:ident $call:ident) => {
+        impl<S: Simd> $trait for Wide<S> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                lanewise!(|i| self.0[i] $op other.0[i])
+                Self { value: self.simd.$call(self.value, other.value), ..self }
             }
         }
     };
 }
-operator!(Add add +);
-operator!(Sub sub -);
-operator!(Mul mul *);
-operator!(Div div /);
+operator!(Add add add_f64s);
+operator!(Sub sub sub_f64s);
+operator!(Mul mul mul_f64s);
+operator!(Div div div_f64s);
 
-impl Neg for F64x8 {
+impl<S: Simd> Neg for Wide<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        lanewise!(|i| -self.0[i])
+        Self { value: self.simd.neg_f64s(self.value), ..self }
     }
 }
 
-impl Lane for F64x8 {
-    const WIDTH: usize = WIDTH;
+impl<S: Simd> Wide<S> {
+    /// `self` where `self > other`, else `other`: the order of the operands decides for NaN, alike
+    /// on every instruction set.
     #[inline(always)]
-    fn splat(value: f64) -> Self {
-        F64x8([value; WIDTH])
+    fn select_greater(self, other: Self, yes: Self, no: Self) -> Self {
+        let mask = self.simd.greater_than_f64s(self.value, other.value);
+        Self { value: self.simd.select_f64s(mask, yes.value, no.value), ..self }
+    }
+}
+
+impl<S: Simd> Lane for Wide<S> {
+    type Token = S;
+    const WIDTH: usize = S::F64_LANES;
+    #[inline(always)]
+    fn token(self) -> S {
+        self.simd
+    }
+    #[inline(always)]
+    fn splat(simd: S, value: f64) -> Self {
+        Self { simd, value: simd.splat_f64s(value) }
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
-        lanewise!(|i| f64::mul_add(self.0[i], a.0[i], b.0[i]))
+        Self { value: self.simd.mul_add_f64s(self.value, a.value, b.value), ..self }
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        lanewise!(|i| self.0[i].sqrt())
+        Self { value: self.simd.sqrt_f64s(self.value), ..self }
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        lanewise!(|i| if self.0[i] < other.0[i] {
-            self.0[i]
-        } else {
-            other.0[i]
-        })
+        other.select_greater(self, self, other)
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        lanewise!(|i| if self.0[i] > other.0[i] {
-            self.0[i]
-        } else {
-            other.0[i]
-        })
+        self.select_greater(other, self, other)
     }
     #[inline(always)]
     fn if_positive(self, yes: Self, no: Self) -> Self {
-        lanewise!(|i| if self.0[i] > 0.0 { yes.0[i] } else { no.0[i] })
+        self.select_greater(self.of(0.0), yes, no)
     }
     #[inline(always)]
-    fn inverse_cbrt_guess(self) -> Self {
-        lanewise!(|i| inverse_cbrt_guess(self.0[i]))
-    }
-    #[inline(always)]
-    fn load(from: &[f64], at: usize) -> Self {
-        let from: &[f64; WIDTH] = from[at..at + WIDTH].try_into().expect("eight values");
-        F64x8(*from)
+    fn load(simd: S, from: &[f64], at: usize) -> Self {
+        let (whole, _) = S::as_simd_f64s(&from[at..at + Self::WIDTH]);
+        Self { simd, value: whole[0] }
     }
     #[inline(always)]
     fn store(self, to: &mut [f64], at: usize) {
-        to[at..at + WIDTH].copy_from_slice(&self.0);
+        let (whole, _) = S::as_mut_simd_f64s(&mut to[at..at + Self::WIDTH]);
+        whole[0] = self.value;
     }
     #[inline(always)]
-    fn lanes(self) -> [f64; WIDTH] {
-        self.0
+    fn for_lanes(self, mut each: impl FnMut(usize, f64)) {
+        let values: &[f64] = bytemuck::cast_slice(std::slice::from_ref(&self.value));
+        for (lane, value) in values.iter().enumerate() {
+            each(lane, *value);
+        }
+    }
+    #[inline(always)]
+    fn inverse_cbrt_guess(self) -> Self {
+        let mut guess = self;
+        let values: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut guess.value));
+        for value in values {
+            *value = inverse_cbrt_guess(*value);
+        }
+        guess
     }
 }
 
-/// Runs `work` compiled for the widest vectors that this processor has. Everything that `work`
-/// calls must be `#[inline(always)]` down to the operations of [`Lane`].
-#[inline(always)]
-pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
-    pulp::Arch::new().dispatch(work)
+/// Work on the slices of a slab, written once over lanes.
+pub trait Work {
+    /// What it returns.
+    type Output;
+    /// Does the work. Implementations and all they call are `#[inline(always)]`, closures included,
+    /// down to the operations of [`Lane`]: only then do they get the caller's instruction set.
+    fn run<T: Lane>(self, token: T::Token) -> Self::Output;
+}
+
+struct Dispatch<W>(W);
+
+impl<W: Work> pulp::WithSimd for Dispatch<W> {
+    type Output = W::Output;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> W::Output {
+        self.0.run::<Wide<S>>(simd)
+    }
+}
+
+/// Runs `work` on the widest vectors that this processor has.
+pub fn vectorised<W: Work>(work: W) -> W::Output {
+    pulp::Arch::new().dispatch(Dispatch(work))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    struct CubeRoots<'a>(&'a [f64], &'a mut [f64]);
+    impl Work for CubeRoots<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn run<T: Lane>(self, token: T::Token) {
+            for at in (0..self.0.len()).step_by(T::WIDTH) {
+                T::load(token, self.0, at).inverse_cbrt().store(self.1, at);
+            }
+        }
+    }
+
     #[test]
-    fn inverse_cube_root_is_accurate_and_the_same_in_both_widths() {
+    fn inverse_cube_root_is_accurate_and_the_same_in_every_width() {
+        let x: Vec<f64> = (0..4000).map(|i| 10f64.powf(-6.0 + f64::from(i) * 0.003)).collect();
+        let (mut wide, mut single) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+        vectorised(CubeRoots(&x, &mut wide));
+        CubeRoots(&x, &mut single).run::<f64>(());
         let mut worst: f64 = 0.0;
-        for i in 0..4000 {
-            let x = 10f64.powf(-6.0 + i as f64 * 0.003);
-            let y = Lane::inverse_cbrt(x);
-            worst = worst.max((y * x.cbrt() - 1.0).abs());
-            let wide = vectorised(
-                #[inline(always)]
-                || Lane::inverse_cbrt(F64x8([x; WIDTH])),
-            );
-            assert_eq!(wide.0[3].to_bits(), y.to_bits());
+        for (i, x) in x.iter().enumerate() {
+            worst = worst.max((wide[i] * x.cbrt() - 1.0).abs());
+            assert_eq!(wide[i].to_bits(), single[i].to_bits());
         }
         println!("relative error {worst:e} (tolerance 1e-15)");
         assert!(worst < 1e-15);

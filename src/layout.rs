@@ -4,7 +4,7 @@
 //! one after the particles, and the unused lanes of the last slice, hold finite dummies, so that a
 //! slice can be read at any offset and a pair weight of 0 makes the dummies harmless.
 
-use crate::lane::{F64x8, WIDTH};
+use crate::lane::{SLICE, Slots};
 
 /// Shape shared by all arrays of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,15 +21,11 @@ impl Layout {
     /// Layout for a number of particles. The slab is a function of that number alone: small enough
     /// to feed many threads, large enough to make its bookkeeping negligible.
     pub fn new(particles: usize) -> Self {
-        let slices = particles.div_ceil(WIDTH).max(1);
-        Self {
-            particles,
-            slices,
-            slab: (slices / 256).clamp(8, 256),
-        }
+        let slices = particles.div_ceil(SLICE).max(1);
+        Self { particles, slices, slab: (slices / 256).clamp(8, 256) }
     }
     /// First slot: the guard slice comes before.
-    pub const FIRST: usize = WIDTH;
+    pub const FIRST: usize = SLICE;
     /// Slot of a particle in the body's order.
     pub fn slot(particle: usize) -> usize {
         particle + Self::FIRST
@@ -41,10 +37,7 @@ impl Layout {
     /// First slot and number of slices of a slab.
     pub fn slab_range(&self, index: usize) -> (usize, usize) {
         let first = index * self.slab;
-        (
-            Self::FIRST + first * WIDTH,
-            self.slab.min(self.slices - first),
-        )
+        (Self::FIRST + first * SLICE, self.slab.min(self.slices - first))
     }
     /// Slices from one component to the next. A distance that is a multiple of 4 kB would map all
     /// components of a particle to the same cache set.
@@ -57,7 +50,7 @@ impl Layout {
 /// `N` components per particle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Array<const N: usize> {
-    data: Vec<F64x8>,
+    data: Vec<Slots>,
     layout: Layout,
 }
 
@@ -67,25 +60,18 @@ impl<const N: usize> Array<N> {
         let stride = layout.stride();
         let mut data = Vec::with_capacity(N * stride);
         for v in value {
-            data.resize(data.len() + stride, F64x8([v; WIDTH]));
+            data.resize(data.len() + stride, Slots([v; SLICE]));
         }
         Self { data, layout }
     }
     /// An array without particles, to stand in for one that is taken out for a while.
     pub fn empty() -> Self {
-        Self {
-            data: Vec::new(),
-            layout: Layout {
-                particles: 0,
-                slices: 0,
-                slab: 1,
-            },
-        }
+        Self { data: Vec::new(), layout: Layout { particles: 0, slices: 0, slab: 1 } }
     }
     /// The components, each with its guard slices: index them with a slot.
     #[inline(always)]
     pub fn components(&self) -> [&[f64]; N] {
-        let stride = self.layout.stride() * WIDTH;
+        let stride = self.layout.stride() * SLICE;
         let all: &[f64] = self.flat();
         std::array::from_fn(|c| &all[c * stride..(c + 1) * stride])
     }
@@ -107,7 +93,7 @@ impl<const N: usize> Array<N> {
     }
     /// Distance between components, in numbers.
     pub fn component_stride(&self) -> usize {
-        self.layout.stride() * WIDTH
+        self.layout.stride() * SLICE
     }
     /// Value of a slot.
     #[inline]
@@ -138,9 +124,7 @@ impl<const N: usize> Array<N> {
         (0..self.layout.slabs())
             .map(|_| {
                 std::array::from_fn(|c| {
-                    bytemuck::must_cast_slice_mut(
-                        pieces[c].next().expect("as many pieces as slabs"),
-                    )
+                    bytemuck::must_cast_slice_mut(pieces[c].next().expect("as many pieces as slabs"))
                 })
             })
             .collect()
@@ -167,7 +151,7 @@ mod tests {
             for (s, piece) in array.slabs_mut().into_iter().enumerate() {
                 let (first, slices) = layout.slab_range(s);
                 for (c, values) in piece.into_iter().enumerate() {
-                    assert_eq!(values.len(), slices * WIDTH);
+                    assert_eq!(values.len(), slices * SLICE);
                     for (i, v) in values.iter_mut().enumerate() {
                         assert_eq!(*v, -1.0);
                         *v = (1000 * (first + i) + c) as f64;
@@ -179,8 +163,8 @@ mod tests {
                 assert_eq!(array.get(slot), [0, 1, 2].map(|c| (1000 * slot + c) as f64));
             }
             for c in array.components() {
-                assert!(c[..WIDTH].iter().all(|v| *v == -1.0));
-                assert!(c[WIDTH * (layout.slices + 1)..].iter().all(|v| *v == -1.0));
+                assert!(c[..SLICE].iter().all(|v| *v == -1.0));
+                assert!(c[SLICE * (layout.slices + 1)..].iter().all(|v| *v == -1.0));
             }
         }
     }

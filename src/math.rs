@@ -9,17 +9,26 @@ pub type Vec3<T> = [T; 3];
 /// A second-order tensor, row-major.
 pub type Mat3<T> = [[T; 3]; 3];
 
-/// Identity.
+/// Identity of set-up code.
+pub const IDENTITY: Mat3<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Identity on lanes.
 #[inline(always)]
-pub fn identity<T: Lane>() -> Mat3<T> {
-    let (o, i) = (T::splat(0.0), T::splat(1.0));
+pub fn identity<T: Lane>(token: T::Token) -> Mat3<T> {
+    let (o, i) = (T::splat(token, 0.0), T::splat(token, 1.0));
     [[i, o, o], [o, i, o], [o, o, i]]
 }
 
-/// Zero vector.
+/// Zero vector on lanes.
 #[inline(always)]
-pub fn zero3<T: Lane>() -> Vec3<T> {
-    [T::splat(0.0); 3]
+pub fn zero3<T: Lane>(token: T::Token) -> Vec3<T> {
+    [T::splat(token, 0.0); 3]
+}
+
+/// Row-major components.
+pub fn flat(m: &Mat3<f64>) -> [f64; 9] {
+    let [[a, b, c], [d, e, f], [g, h, i]] = *m;
+    [a, b, c, d, e, f, g, h, i]
 }
 
 /// a + b.
@@ -43,11 +52,7 @@ pub fn scale3<T: Lane>(s: T, a: Vec3<T>) -> Vec3<T> {
 /// a + s b.
 #[inline(always)]
 pub fn axpy3<T: Lane>(a: Vec3<T>, s: T, b: Vec3<T>) -> Vec3<T> {
-    [
-        s.mul_add(b[0], a[0]),
-        s.mul_add(b[1], a[1]),
-        s.mul_add(b[2], a[2]),
-    ]
+    [s.mul_add(b[0], a[0]), s.mul_add(b[1], a[1]), s.mul_add(b[2], a[2])]
 }
 
 /// a . b.
@@ -59,11 +64,7 @@ pub fn dot<T: Lane>(a: Vec3<T>, b: Vec3<T>) -> T {
 /// a x b.
 #[inline(always)]
 pub fn cross<T: Lane>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// A a.
@@ -87,38 +88,31 @@ pub fn scale9<T: Lane>(s: T, a: &Mat3<T>) -> Mat3<T> {
 /// A + s B.
 #[inline(always)]
 pub fn axpy9<T: Lane>(a: &Mat3<T>, s: T, b: &Mat3<T>) -> Mat3<T> {
-    [
-        axpy3(a[0], s, b[0]),
-        axpy3(a[1], s, b[1]),
-        axpy3(a[2], s, b[2]),
-    ]
+    [axpy3(a[0], s, b[0]), axpy3(a[1], s, b[1]), axpy3(a[2], s, b[2])]
 }
 
 /// A + a b^T.
 #[inline(always)]
 pub fn add_outer<T: Lane>(m: &Mat3<T>, a: Vec3<T>, b: Vec3<T>) -> Mat3<T> {
-    [
-        axpy3(m[0], a[0], b),
-        axpy3(m[1], a[1], b),
-        axpy3(m[2], a[2], b),
-    ]
+    [axpy3(m[0], a[0], b), axpy3(m[1], a[1], b), axpy3(m[2], a[2], b)]
 }
 
 /// A^T.
 #[inline(always)]
 pub fn transpose<T: Lane>(m: &Mat3<T>) -> Mat3<T> {
-    [
-        [m[0][0], m[1][0], m[2][0]],
-        [m[0][1], m[1][1], m[2][1]],
-        [m[0][2], m[1][2], m[2][2]],
-    ]
+    [[m[0][0], m[1][0], m[2][0]], [m[0][1], m[1][1], m[2][1]], [m[0][2], m[1][2], m[2][2]]]
+}
+
+/// a^T B.
+#[inline(always)]
+pub fn vec_mat<T: Lane>(a: Vec3<T>, b: &Mat3<T>) -> Vec3<T> {
+    axpy3(axpy3(scale3(a[0], b[0]), a[1], b[1]), a[2], b[2])
 }
 
 /// A B.
 #[inline(always)]
 pub fn mat_mul<T: Lane>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
-    let row = |r: Vec3<T>| axpy3(axpy3(scale3(r[0], b[0]), r[1], b[1]), r[2], b[2]);
-    [row(a[0]), row(a[1]), row(a[2])]
+    [vec_mat(a[0], b), vec_mat(a[1], b), vec_mat(a[2], b)]
 }
 
 /// A B^T.
@@ -142,34 +136,38 @@ pub fn cofactor<T: Lane>(m: &Mat3<T>) -> Mat3<T> {
 /// Tensor cross product A x B ([URL22] and de Boer): (A x B)_iI = e_ijk e_IJK A_jJ B_kK.
 #[inline(always)]
 pub fn tensor_cross<T: Lane>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
-    let row = |i: usize, j: usize| add3(cross(a[i], b[j]), cross(b[i], a[j]));
-    [row(1, 2), row(2, 0), row(0, 1)]
+    [
+        add3(cross(a[1], b[2]), cross(b[1], a[2])),
+        add3(cross(a[2], b[0]), cross(b[2], a[0])),
+        add3(cross(a[0], b[1]), cross(b[0], a[1])),
+    ]
 }
 
 /// Largest eigenvalue of a symmetric positive semi-definite matrix, in closed form without branches:
 /// m + 2 p cos(phi) with 4 c^3 - 3 c = cos(3 phi), c = cos(phi) in [1/2, 1].
 #[inline(always)]
 pub fn largest_eigenvalue<T: Lane>(a: &Mat3<T>) -> T {
-    let s = T::splat;
-    let third = s(1.0 / 3.0);
-    let m = (a[0][0] + a[1][1] + a[2][2]) * third;
+    let token = a[0][0].token();
+    let (one, half, three) = (T::splat(token, 1.0), T::splat(token, 0.5), T::splat(token, 3.0));
+    let m = (a[0][0] + a[1][1] + a[2][2]) * T::splat(token, 1.0 / 3.0);
     let d = [a[0][0] - m, a[1][1] - m, a[2][2] - m];
     let off = a[0][1] * a[0][1] + a[0][2] * a[0][2] + a[1][2] * a[1][2];
-    let p2 = (dot(d, d) + off + off) * s(1.0 / 6.0);
+    let p2 = (dot(d, d) + off + off) * T::splat(token, 1.0 / 6.0);
     let p = p2.sqrt();
     let det = d[0] * (d[1] * d[2] - a[1][2] * a[1][2])
         - a[0][1] * (a[0][1] * d[2] - a[1][2] * a[0][2])
         + a[0][2] * (a[0][1] * a[1][2] - d[1] * a[0][2]);
     // p = 0 is the undeformed state: any c serves there, so the guard only has to avoid 0/0.
-    let r = (det * s(0.5)) / (p2 * p + s(f64::MIN_POSITIVE));
-    let r = r.min(s(1.0)).max(s(-1.0));
-    let mut c = (((r + s(1.0)) * s(0.5)).sqrt() + s(1.0)) * s(0.5);
+    let r = (det * half) / (p2 * p + T::splat(token, f64::MIN_POSITIVE));
+    let r = r.min(one).max(-one);
+    let mut c = (((r + one) * half).sqrt() + one) * half;
     for _ in 0..3 {
-        let value = (s(4.0) * c * c - s(3.0)) * c - r;
-        let slope = s(12.0) * c * c - s(3.0);
-        c = c - value / (slope + s(1e-30));
+        let c2 = T::splat(token, 4.0) * c * c;
+        let value = (c2 - three) * c - r;
+        let slope = three * (c2 - one);
+        c = c - value / (slope + T::splat(token, 1e-30));
     }
-    (p + p).mul_add(c.min(s(1.0)).max(s(0.5)), m)
+    (p + p).mul_add(c.min(one).max(half), m)
 }
 
 #[cfg(test)]
@@ -223,11 +221,11 @@ mod tests {
             let a = sample(i);
             check(mat_mul_t(&a, &a));
             // Nearly isotropic, and two nearly equal largest values.
-            check(axpy9(&identity(), 1e-7, &mat_mul_t(&a, &a)));
+            check(axpy9(&IDENTITY, 1e-7, &mat_mul_t(&a, &a)));
             let t = 1e-9 * i as f64;
             check([[2.0 + t, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.1]]);
         }
-        check(identity());
+        check(IDENTITY);
         println!("relative error {worst:e} (tolerance 1e-7)");
         assert!(worst < 1e-7);
     }

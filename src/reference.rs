@@ -18,7 +18,7 @@
 
 use crate::error::{Error, Result};
 use crate::kernel;
-use crate::lane::{F64x8, Lane, WIDTH, vectorised};
+use crate::lane::{Lane, SLICE, Slots, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::math::*;
 use crate::neighbours::Graph;
@@ -35,18 +35,17 @@ pub struct Slices {
     /// Slot of the neighbour of the slice's first lane.
     base: Vec<u32>,
     /// k of the initial configuration per lane; 0 where a lane has no neighbour in this entry.
-    weight: Vec<F64x8>,
+    weight: Vec<Slots>,
 }
 
 impl Slices {
-    /// The neighbour loop: calls `body(neighbour's slot, index of the pair)` for the particles in
-    /// the slots from `a`. Lanes without a neighbour come with weight 0.
+    /// The neighbour loop: (neighbour's slot, index of the pair) for the particles in the slots
+    /// from `a`, as many as the lanes are wide. Lanes without a neighbour come with weight 0.
     #[inline(always)]
-    pub fn for_each<T: Lane>(&self, a: usize, mut body: impl FnMut(usize, usize)) {
-        let (slice, lane) = ((a - Layout::FIRST) / WIDTH, (a - Layout::FIRST) % WIDTH);
-        for entry in self.start[slice] as usize..self.start[slice + 1] as usize {
-            body(self.base[entry] as usize + lane, entry * WIDTH + lane);
-        }
+    pub fn of(&self, a: usize) -> NeighboursOf<'_> {
+        let (slice, lane) = ((a - Layout::FIRST) / SLICE, (a - Layout::FIRST) % SLICE);
+        let entries = self.start[slice] as usize..self.start[slice + 1] as usize;
+        NeighboursOf { base: self.base[entries.clone()].iter(), pair: entries.start * SLICE + lane, lane }
     }
     /// Weights by pair index.
     #[inline(always)]
@@ -55,15 +54,11 @@ impl Slices {
     }
 
     fn new(graph: &Graph, layout: Layout) -> Self {
-        let mut this = Self {
-            start: vec![0],
-            base: Vec::new(),
-            weight: Vec::new(),
-        };
+        let mut this = Self { start: vec![0], base: Vec::new(), weight: Vec::new() };
         let mut offsets = Vec::new();
         for slice in 0..layout.slices {
-            let first = slice * WIDTH;
-            let members = first..(first + WIDTH).min(graph.count());
+            let first = slice * SLICE;
+            let members = first..(first + SLICE).min(graph.count());
             offsets.clear();
             for a in members {
                 offsets.extend(graph.of(a).iter().map(|&b| i64::from(b) - a as i64));
@@ -72,12 +67,8 @@ impl Slices {
             offsets.dedup();
             // A lane of the slice has a neighbour at each offset, so the base is at most 7 slots
             // before the first particle: inside the guard.
-            this.base.extend(
-                offsets
-                    .iter()
-                    .map(|o| (Layout::slot(first) as i64 + o) as u32),
-            );
-            this.weight.resize(this.base.len(), F64x8([0.0; WIDTH]));
+            this.base.extend(offsets.iter().map(|o| (Layout::slot(first) as i64 + o) as u32));
+            this.weight.resize(this.base.len(), Slots([0.0; SLICE]));
             this.start.push(this.base.len() as u32);
         }
         this
@@ -85,20 +76,36 @@ impl Slices {
 
     /// Pair index of an existing pair.
     fn entry(&self, a: usize, b: usize) -> usize {
-        let (slice, lane) = (a / WIDTH, a % WIDTH);
+        let (slice, lane) = (a / SLICE, a % SLICE);
         let range = self.start[slice] as usize..self.start[slice + 1] as usize;
         let base = (Layout::slot(b) - lane) as u32;
-        let at = self.base[range.clone()]
-            .binary_search(&base)
-            .expect("pair in its slice");
-        (range.start + at) * WIDTH + lane
+        let at = self.base[range.clone()].binary_search(&base).expect("pair in its slice");
+        (range.start + at) * SLICE + lane
+    }
+}
+
+/// See [`Slices::of`].
+pub struct NeighboursOf<'a> {
+    base: std::slice::Iter<'a, u32>,
+    pair: usize,
+    lane: usize,
+}
+
+impl Iterator for NeighboursOf<'_> {
+    type Item = (usize, usize);
+    #[inline(always)]
+    fn next(&mut self) -> Option<(usize, usize)> {
+        let base = *self.base.next()? as usize;
+        let pair = self.pair;
+        self.pair += SLICE;
+        Some((base + self.lane, pair))
     }
 }
 
 /// Pair vectors g_ab and g_ba of a pair.
 pub trait PairVectors: Copy + Sync {
     /// What is read once per particle.
-    fn centre<T: Lane>(&self, a: usize) -> Vec3<T>;
+    fn centre<T: Lane>(&self, token: T::Token, a: usize) -> Vec3<T>;
     /// (g_ab, g_ba).
     fn pair<T: Lane>(&self, centre: Vec3<T>, b: usize, pair: usize) -> (Vec3<T>, Vec3<T>);
 }
@@ -112,12 +119,13 @@ pub struct Lean<'a> {
 
 impl PairVectors for Lean<'_> {
     #[inline(always)]
-    fn centre<T: Lane>(&self, a: usize) -> Vec3<T> {
-        load3(&self.x, a)
+    fn centre<T: Lane>(&self, token: T::Token, a: usize) -> Vec3<T> {
+        load3(token, &self.x, a)
     }
     #[inline(always)]
     fn pair<T: Lane>(&self, centre: Vec3<T>, b: usize, pair: usize) -> (Vec3<T>, Vec3<T>) {
-        let g = scale3(T::load(self.k, pair), sub3(load3(&self.x, b), centre));
+        let token = centre[0].token();
+        let g = scale3(T::load(token, self.k, pair), sub3(load3(token, &self.x, b), centre));
         (g, [-g[0], -g[1], -g[2]])
     }
 }
@@ -131,19 +139,20 @@ pub struct Stored<'a> {
 
 impl PairVectors for Stored<'_> {
     #[inline(always)]
-    fn centre<T: Lane>(&self, _: usize) -> Vec3<T> {
-        zero3()
+    fn centre<T: Lane>(&self, token: T::Token, _: usize) -> Vec3<T> {
+        zero3(token)
     }
     #[inline(always)]
-    fn pair<T: Lane>(&self, _: Vec3<T>, _: usize, pair: usize) -> (Vec3<T>, Vec3<T>) {
-        (load3(&self.ab, pair), load3(&self.ba, pair))
+    fn pair<T: Lane>(&self, centre: Vec3<T>, _: usize, pair: usize) -> (Vec3<T>, Vec3<T>) {
+        let token = centre[0].token();
+        (load3(token, &self.ab, pair), load3(token, &self.ba, pair))
     }
 }
 
 #[derive(Debug)]
 struct StoredVectors {
-    ab: [Vec<F64x8>; 3],
-    ba: [Vec<F64x8>; 3],
+    ab: [Vec<Slots>; 3],
+    ba: [Vec<Slots>; 3],
 }
 
 /// Which pair vectors there are now; the caller matches once, outside the particle loop.
@@ -193,24 +202,14 @@ pub struct Reference {
 }
 
 #[inline(always)]
-pub(crate) fn load3<T: Lane>(from: &[&[f64]; 3], at: usize) -> Vec3<T> {
-    [
-        T::load(from[0], at),
-        T::load(from[1], at),
-        T::load(from[2], at),
-    ]
+pub(crate) fn load3<T: Lane>(token: T::Token, from: &[&[f64]; 3], at: usize) -> Vec3<T> {
+    [T::load(token, from[0], at), T::load(token, from[1], at), T::load(token, from[2], at)]
 }
 
 #[inline(always)]
-pub(crate) fn load9<T: Lane>(from: &[&[f64]; 9], at: usize) -> Mat3<T> {
-    let row = |r: usize| {
-        [
-            T::load(from[r], at),
-            T::load(from[r + 1], at),
-            T::load(from[r + 2], at),
-        ]
-    };
-    [row(0), row(3), row(6)]
+pub(crate) fn load9<T: Lane>(token: T::Token, from: &[&[f64]; 9], at: usize) -> Mat3<T> {
+    let [a, b, c, d, e, f, g, h, i] = from;
+    [load3(token, &[a, b, c], at), load3(token, &[d, e, f], at), load3(token, &[g, h, i], at)]
 }
 
 #[inline(always)]
@@ -233,26 +232,22 @@ pub(crate) fn store9<T: Lane>(value: &Mat3<T>, to: &mut [&mut [f64]; 9], at: usi
 #[inline(always)]
 fn inverse<T: Lane>(m: &Mat3<T>) -> Mat3<T> {
     let cof = cofactor(m);
-    scale9(T::splat(1.0) / dot(m[0], cof[0]), &transpose(&cof))
+    scale9(m[0][0].of(1.0) / dot(m[0], cof[0]), &transpose(&cof))
 }
 
 /// r^_ab and F_ave^-1 of a pair (46).
 #[inline(always)]
-fn pull_back(
+fn pull_back<T: Lane>(
+    token: T::Token,
     f_chi: &[&[f64]; 9],
     chi: &[&[f64]; 3],
     a: usize,
     b: usize,
-) -> (Vec3<F64x8>, Mat3<F64x8>) {
-    let sum = add9(&load9::<F64x8>(f_chi, a), &load9(f_chi, b));
-    let inverse = inverse(&scale9(F64x8::splat(0.5), &sum));
-    (
-        mat_vec(&inverse, sub3(load3(chi, b), load3(chi, a))),
-        inverse,
-    )
+) -> (Vec3<T>, Mat3<T>) {
+    let sum = add9(&load9::<T>(token, f_chi, a), &load9(token, f_chi, b));
+    let inverse = inverse(&scale9(T::splat(token, 0.5), &sum));
+    (mat_vec(&inverse, sub3(load3(token, chi, b), load3(token, chi, a))), inverse)
 }
-
-const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 impl Reference {
     /// The reference of a body at rest: the initial configuration.
@@ -269,10 +264,10 @@ impl Reference {
         }
         let updated = (numerics.reference_update != ReferenceUpdate::Never).then(|| Updated {
             chi: x_initial.clone(),
-            f_chi: Array::new(layout, IDENTITY),
+            f_chi: Array::new(layout, flat(&IDENTITY)),
             j_chi: Array::new(layout, [1.0]),
             h_chi: (numerics.state == crate::scene::StateMeasures::Fhj)
-                .then(|| Array::new(layout, IDENTITY)),
+                .then(|| Array::new(layout, flat(&IDENTITY))),
         });
         let counts = (0..graph.count()).map(|i| graph.of(i).len());
         let mut this = Self {
@@ -310,11 +305,7 @@ impl Reference {
         };
         let h: Vec<f64> = parallel::fill(graph.count(), |a| {
             self.smoothing_factor
-                * graph
-                    .of(a)
-                    .iter()
-                    .map(|&b| distance(a, b))
-                    .fold(0.0, f64::max)
+                * graph.of(a).iter().map(|&b| distance(a, b)).fold(0.0, f64::max)
         });
         // Lengths and volumes over their means: weights of order one in any unit system.
         let unit = h.iter().sum::<f64>() / h.len() as f64;
@@ -326,8 +317,7 @@ impl Reference {
                 Weights::Unit => 0.5 * (kernel::slope(r, ha) + kernel::slope(r, hb)),
                 // V_b as printed; V_a, common to all pairs of a, makes the weight symmetric.
                 Weights::Tributary => {
-                    particles.volumes[a] * particles.volumes[b as usize]
-                        / (mean_volume * mean_volume)
+                    particles.volumes[a] * particles.volumes[b as usize] / (mean_volume * mean_volume)
                         * kernel::slope(r, hb)
                 }
             }
@@ -338,7 +328,7 @@ impl Reference {
                 let (k, back) = (weight(a, b), weight(b as usize, a as u32));
                 symmetric &= k == back;
                 let pair = self.slices.entry(a, b as usize);
-                self.slices.weight[pair / WIDTH].0[pair % WIDTH] = k;
+                self.slices.weight[pair / SLICE].0[pair % SLICE] = k;
             }
         }
         if !symmetric {
@@ -349,8 +339,8 @@ impl Reference {
                     let (k, back) = (weight(a, b), weight(b as usize, a as u32));
                     for c in 0..3 {
                         let r = particles.positions[b as usize][c] - particles.positions[a][c];
-                        stored.ab[c][pair / WIDTH].0[pair % WIDTH] = k * r;
-                        stored.ba[c][pair / WIDTH].0[pair % WIDTH] = -back * r;
+                        stored.ab[c][pair / SLICE].0[pair % SLICE] = k * r;
+                        stored.ba[c][pair / SLICE].0[pair % SLICE] = -back * r;
                     }
                 }
             }
@@ -359,20 +349,14 @@ impl Reference {
     }
 
     fn new_stored(&self) -> StoredVectors {
-        let zeros = || std::array::from_fn(|_| vec![F64x8([0.0; WIDTH]); self.slices.base.len()]);
-        StoredVectors {
-            ab: zeros(),
-            ba: zeros(),
-        }
+        let zeros = || std::array::from_fn(|_| vec![Slots([0.0; SLICE]); self.slices.base.len()]);
+        StoredVectors { ab: zeros(), ba: zeros() }
     }
 
     /// The pair vectors now.
     pub fn pair_vectors(&self) -> Pairs<'_> {
         match &self.stored {
-            None => Pairs::Lean(Lean {
-                k: self.slices.weights(),
-                x: self.x_initial.components(),
-            }),
+            None => Pairs::Lean(Lean { k: self.slices.weights(), x: self.x_initial.components() }),
             Some(s) => Pairs::Stored(Stored {
                 ab: std::array::from_fn(|c| bytemuck::must_cast_slice(&s.ab[c][..])),
                 ba: std::array::from_fn(|c| bytemuck::must_cast_slice(&s.ba[c][..])),
@@ -394,110 +378,34 @@ impl Reference {
 
     /// L_a for the present pair vectors; the slot of the first particle where it does not exist.
     fn correct(&mut self) -> Option<usize> {
-        let mut l = std::mem::replace(&mut self.l, Array::new(self.layout, [0.0; 9]));
+        let mut l = std::mem::replace(&mut self.l, Array::empty());
         let this = &*self;
-        let bad = parallel::map_slabs(l.slabs_mut(), |slab, mut out| match this.pair_vectors() {
-            Pairs::Lean(pairs) => this.correct_slab(pairs, slab, &mut out),
-            Pairs::Stored(pairs) => this.correct_slab(pairs, slab, &mut out),
+        let updated = this.updated.as_ref();
+        let points = match updated {
+            Some(u) if this.option > 1 => u.chi.components(),
+            _ => this.x_initial.components(),
+        };
+        let f_chi = updated.filter(|_| this.option < 4).map(|u| u.f_chi.components());
+        let bad = parallel::map_slabs(l.slabs_mut(), |slab, out| match this.pair_vectors() {
+            Pairs::Lean(pairs) => vectorised(Correct { pairs, this, points, f_chi, slab, out }),
+            Pairs::Stored(pairs) => vectorised(Correct { pairs, this, points, f_chi, slab, out }),
         });
         self.l = l;
         bad.into_iter().flatten().next()
     }
 
-    fn correct_slab<P: PairVectors>(
-        &self,
-        pairs: P,
-        slab: usize,
-        out: &mut [&mut [f64]; 9],
-    ) -> Option<usize> {
-        let (first, slices) = self.layout.slab_range(slab);
-        let (option, updated) = (self.option, self.updated.as_ref());
-        let points = match updated {
-            Some(u) if option > 1 => u.chi.components(),
-            _ => self.x_initial.components(),
-        };
-        let f_chi = updated.filter(|_| option < 4).map(|u| u.f_chi.components());
-        let mut bad = None;
-        vectorised(
-            #[inline(always)]
-            || {
-                for i in 0..slices {
-                    let a = first + i * WIDTH;
-                    let f = f_chi.map_or(identity::<F64x8>(), |f| load9(&f, a));
-                    let cof = cofactor(&f);
-                    let f_inverse_t = scale9(F64x8::splat(1.0) / dot(f[0], cof[0]), &cof);
-                    let (xa, centre) = (load3(&points, a), pairs.centre::<F64x8>(a));
-                    let mut moment = [zero3(); 3];
-                    self.slices.for_each::<F64x8>(a, |b, pair| {
-                        let (g, _) = pairs.pair(centre, b, pair);
-                        moment = add_outer(&moment, g, sub3(load3(&points, b), xa));
-                    });
-                    let l = if option == 1 {
-                        mat_mul(&f_inverse_t, &inverse(&moment))
-                    } else {
-                        mat_mul(&inverse(&mat_mul(&f_inverse_t, &moment)), &f_inverse_t)
-                    };
-                    for lane in 0..WIDTH {
-                        let particle = a + lane - Layout::FIRST;
-                        if particle >= self.layout.particles {
-                            // A dummy has no pairs: any finite L serves.
-                            for row in out.iter_mut() {
-                                row[i * WIDTH + lane] = 0.0;
-                            }
-                            continue;
-                        }
-                        if !is_regular(&moment, lane) {
-                            bad = bad.or(Some(a + lane));
-                        }
-                        for (c, row) in out.iter_mut().enumerate() {
-                            row[i * WIDTH + lane] = l[c / 3][c % 3].0[lane];
-                        }
-                    }
-                }
-            },
-        );
-        bad
-    }
-
     /// g_ab of options #3 and #4 from chi and F_chi.
     fn updated_vectors(&mut self) {
-        let u = self
-            .updated
-            .as_ref()
-            .expect("called for an updated reference");
-        let (chi, f_chi, j_chi) = (
-            u.chi.components(),
-            u.f_chi.components(),
-            u.j_chi.components()[0],
-        );
+        let u = self.updated.as_ref().expect("called for an updated reference");
+        let (chi, f_chi, j_chi) = (u.chi.components(), u.f_chi.components(), u.j_chi.components()[0]);
         let volume = self.volume.components()[0];
-        let weights = self.slices.weights();
         let mut h = Array::<1>::new(self.layout, [1.0]);
         parallel::map_slabs(h.slabs_mut(), |slab, [out]| {
-            let (first, slices) = self.layout.slab_range(slab);
-            vectorised(
-                #[inline(always)]
-                || {
-                    for i in 0..slices {
-                        let a = first + i * WIDTH;
-                        let mut longest = F64x8::splat(0.0);
-                        self.slices.for_each::<F64x8>(a, |b, pair| {
-                            let (r, _) = pull_back(&f_chi, &chi, a, b);
-                            let mask = F64x8::load(weights, pair);
-                            longest = mask.if_positive(longest.max(dot(r, r)), longest);
-                        });
-                        (longest.sqrt() * F64x8::splat(self.smoothing_factor))
-                            .store(out, i * WIDTH);
-                    }
-                },
-            );
+            vectorised(SmoothingLength { this: self, chi, f_chi, slab, out });
         });
         let particles = self.layout.particles as f64;
         let mean = |values: &[f64]| {
-            values[Layout::FIRST..Layout::FIRST + self.layout.particles]
-                .iter()
-                .sum::<f64>()
-                / particles
+            values[Layout::FIRST..Layout::FIRST + self.layout.particles].iter().sum::<f64>() / particles
         };
         let h = h.components()[0];
         let (unit, mean_volume) = (mean(h), mean(volume));
@@ -509,14 +417,11 @@ impl Reference {
         };
         let mut outputs = Vec::new();
         {
-            let mut rest: Vec<&mut [F64x8]> = stored
-                .ab
-                .iter_mut()
-                .chain(stored.ba.iter_mut())
-                .map(|v| &mut v[..])
-                .collect();
+            let vectors = stored.ab.iter_mut().chain(stored.ba.iter_mut());
+            let mut rest: Vec<&mut [f64]> =
+                vectors.map(|v| bytemuck::must_cast_slice_mut(&mut v[..])).collect();
             for slab in 0..self.layout.slabs() {
-                let length = entries(slab).len();
+                let length = entries(slab).len() * SLICE;
                 let mut pieces = Vec::with_capacity(6);
                 for r in &mut rest {
                     let (piece, remaining) = std::mem::take(r).split_at_mut(length);
@@ -526,54 +431,10 @@ impl Reference {
                 outputs.push(pieces);
             }
         }
-        let (option, tributary) = (self.option, self.weights == Weights::Tributary);
-        parallel::map_slabs(outputs, |slab, mut out| {
-            let (first, slices) = self.layout.slab_range(slab);
-            let offset = entries(slab).start;
-            let s = F64x8::splat;
-            vectorised(
-                #[inline(always)]
-                || {
-                    for i in 0..slices {
-                        let a = first + i * WIDTH;
-                        let ha = F64x8::load(h, a) / s(unit);
-                        let va = F64x8::load(volume, a) / s(mean_volume);
-                        let ja = F64x8::load(j_chi, a);
-                        self.slices.for_each::<F64x8>(a, |b, pair| {
-                            let (r, f_inverse) = pull_back(&f_chi, &chi, a, b);
-                            let hb = F64x8::load(h, b) / s(unit);
-                            let length = dot(r, r).sqrt() / s(unit);
-                            let (with_b, with_a) =
-                                (kernel::slope(length, hb), kernel::slope(length, ha));
-                            let (k, back) = if tributary {
-                                let v = va * (F64x8::load(volume, b) / s(mean_volume));
-                                if option == 4 {
-                                    // V_chi,b / J_ave instead of V_b (52d); a's own factor cancels.
-                                    let jb = F64x8::load(j_chi, b);
-                                    let mean = s(0.5) * (ja + jb);
-                                    (v * with_b * jb / mean, v * with_a * ja / mean)
-                                } else {
-                                    (v * with_b, v * with_a)
-                                }
-                            } else {
-                                let mean = s(0.5) * (with_a + with_b);
-                                (mean, mean)
-                            };
-                            let direction = if option == 4 {
-                                mat_vec(&transpose(&f_inverse), r)
-                            } else {
-                                r
-                            };
-                            let mask = F64x8::load(weights, pair);
-                            let entry = pair / WIDTH - offset;
-                            for c in 0..3 {
-                                out[c][entry] = mask.if_positive(k * direction[c], s(0.0));
-                                out[3 + c][entry] = mask.if_positive(-back * direction[c], s(0.0));
-                            }
-                        });
-                    }
-                },
-            );
+        parallel::map_slabs(outputs, |slab, out| {
+            vectorised(PulledBackVectors {
+                this: self, chi, f_chi, j_chi, h, unit, mean_volume, slab, out,
+            });
         });
         self.stored = Some(stored);
     }
@@ -587,12 +448,8 @@ impl Reference {
                 + u.h_chi.as_ref().map_or(0, Array::bytes)
         });
         let entries = self.slices.base.len();
-        let stored = if self.stored.is_some() {
-            entries * 6 * size_of::<F64x8>()
-        } else {
-            0
-        };
-        entries * (size_of::<F64x8>() + size_of::<u32>())
+        let stored = if self.stored.is_some() { entries * 6 * size_of::<Slots>() } else { 0 };
+        entries * (size_of::<Slots>() + size_of::<u32>())
             + self.slices.start.len() * size_of::<u32>()
             + self.x_initial.bytes()
             + self.volume.bytes()
@@ -600,16 +457,159 @@ impl Reference {
             + updated
             + stored
     }
+}
 
-    /// Share of lanes that hold a pair.
-    pub fn fill(&self) -> f64 {
-        self.pairs as f64 / (self.slices.base.len() * WIDTH) as f64
+/// L_a of a slab.
+struct Correct<'a, P> {
+    pairs: P,
+    this: &'a Reference,
+    points: [&'a [f64]; 3],
+    f_chi: Option<[&'a [f64]; 9]>,
+    slab: usize,
+    out: [&'a mut [f64]; 9],
+}
+
+impl<P: PairVectors> Work for Correct<'_, P> {
+    type Output = Option<usize>;
+    #[inline(always)]
+    fn run<T: Lane>(mut self, token: T::Token) -> Option<usize> {
+        let (first, slices) = self.this.layout.slab_range(self.slab);
+        let mut bad = None;
+        for at in (0..slices * SLICE).step_by(T::WIDTH) {
+            let a = first + at;
+            let f = match &self.f_chi {
+                Some(f_chi) => load9(token, f_chi, a),
+                None => identity::<T>(token),
+            };
+            let cof = cofactor(&f);
+            let f_inverse_t = scale9(T::splat(token, 1.0) / dot(f[0], cof[0]), &cof);
+            let (xa, centre) = (load3(token, &self.points, a), self.pairs.centre::<T>(token, a));
+            let mut moment = [zero3(token); 3];
+            for (b, pair) in self.this.slices.of(a) {
+                let (g, _) = self.pairs.pair(centre, b, pair);
+                moment = add_outer(&moment, g, sub3(load3(token, &self.points, b), xa));
+            }
+            let l = if self.this.option == 1 {
+                mat_mul(&f_inverse_t, &inverse(&moment))
+            } else {
+                mat_mul(&inverse(&mat_mul(&f_inverse_t, &moment)), &f_inverse_t)
+            };
+            store9(&l, &mut self.out, at);
+            // Row-major moments of the lanes, for the check and for dummies.
+            let mut moments = [[0.0; 9]; SLICE];
+            for (c, m) in moment.iter().flatten().enumerate() {
+                m.for_lanes(|lane, value| moments[lane][c] = value);
+            }
+            for (lane, moment) in moments[..T::WIDTH].iter().enumerate() {
+                if a + lane >= Layout::slot(self.this.layout.particles) {
+                    // A dummy has no pairs: any finite L serves.
+                    for row in &mut self.out {
+                        row[at + lane] = 0.0;
+                    }
+                } else if bad.is_none() && !is_regular(moment) {
+                    bad = Some(a + lane);
+                }
+            }
+        }
+        bad
     }
 }
 
-/// Whether the moment matrix of a lane can be inverted: its determinant over that of a ball.
-fn is_regular(moment: &Mat3<F64x8>, lane: usize) -> bool {
-    let m = nalgebra::Matrix3::from_fn(|r, c| moment[r][c].0[lane]);
+/// h^_b of a slab (47).
+struct SmoothingLength<'a> {
+    this: &'a Reference,
+    chi: [&'a [f64]; 3],
+    f_chi: [&'a [f64]; 9],
+    slab: usize,
+    out: &'a mut [f64],
+}
+
+impl Work for SmoothingLength<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self, token: T::Token) {
+        let (first, slices) = self.this.layout.slab_range(self.slab);
+        let weights = self.this.slices.weights();
+        for at in (0..slices * SLICE).step_by(T::WIDTH) {
+            let a = first + at;
+            let mut longest = T::splat(token, 0.0);
+            for (b, pair) in self.this.slices.of(a) {
+                let (r, _) = pull_back::<T>(token, &self.f_chi, &self.chi, a, b);
+                let mask = T::load(token, weights, pair);
+                longest = mask.if_positive(longest.max(dot(r, r)), longest);
+            }
+            (longest.sqrt() * T::splat(token, self.this.smoothing_factor)).store(self.out, at);
+        }
+    }
+}
+
+/// g_ab and g_ba of options #3 and #4 of a slab.
+struct PulledBackVectors<'a> {
+    this: &'a Reference,
+    chi: [&'a [f64]; 3],
+    f_chi: [&'a [f64]; 9],
+    j_chi: &'a [f64],
+    /// h^ and the mean values that make the weights of order one.
+    h: &'a [f64],
+    unit: f64,
+    mean_volume: f64,
+    slab: usize,
+    /// Components of g_ab, then of g_ba.
+    out: Vec<&'a mut [f64]>,
+}
+
+impl Work for PulledBackVectors<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(mut self, token: T::Token) {
+        let this = self.this;
+        let (first, slices) = this.layout.slab_range(self.slab);
+        let offset = this.slices.start[self.slab * this.layout.slab] as usize * SLICE;
+        let (weights, volume) = (this.slices.weights(), this.volume.components()[0]);
+        let per_length = T::splat(token, 1.0 / self.unit);
+        let per_volume = T::splat(token, 1.0 / (self.mean_volume * self.mean_volume));
+        let (zero, half) = (T::splat(token, 0.0), T::splat(token, 0.5));
+        for at in (0..slices * SLICE).step_by(T::WIDTH) {
+            let a = first + at;
+            let ha = T::load(token, self.h, a) * per_length;
+            let (va, ja) = (T::load(token, volume, a), T::load(token, self.j_chi, a));
+            for (b, pair) in this.slices.of(a) {
+                let (r, f_inverse) = pull_back::<T>(token, &self.f_chi, &self.chi, a, b);
+                let hb = T::load(token, self.h, b) * per_length;
+                let length = dot(r, r).sqrt() * per_length;
+                let (with_b, with_a) = (kernel::slope(length, hb), kernel::slope(length, ha));
+                let (k, back) = match this.weights {
+                    Weights::Unit => {
+                        let mean = half * (with_a + with_b);
+                        (mean, mean)
+                    }
+                    Weights::Tributary => {
+                        let v = va * T::load(token, volume, b) * per_volume;
+                        if this.option == 4 {
+                            // V_chi,b / J_ave instead of V_b (52d); a's own factor cancels.
+                            let jb = T::load(token, self.j_chi, b);
+                            let mean = half * (ja + jb);
+                            (v * with_b * jb / mean, v * with_a * ja / mean)
+                        } else {
+                            (v * with_b, v * with_a)
+                        }
+                    }
+                };
+                let direction =
+                    if this.option == 4 { mat_vec(&transpose(&f_inverse), r) } else { r };
+                let mask = T::load(token, weights, pair);
+                for (c, d) in direction.into_iter().enumerate() {
+                    mask.if_positive(k * d, zero).store(self.out[c], pair - offset);
+                    mask.if_positive(-(back * d), zero).store(self.out[3 + c], pair - offset);
+                }
+            }
+        }
+    }
+}
+
+/// Whether a moment matrix can be inverted: its determinant over that of a ball.
+fn is_regular(moment: &[f64; 9]) -> bool {
+    let m = nalgebra::Matrix3::from_row_slice(moment);
     let scale = m.norm();
     scale.is_finite() && (m.determinant() / scale.powi(3)).abs() > 1e-9
 }

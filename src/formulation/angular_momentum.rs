@@ -33,7 +33,7 @@ pub fn project(
     };
     let slots = |slab: usize| {
         let (first, slices) = layout.slab_range(slab);
-        let end = (first + slices * crate::lane::WIDTH).min(Layout::slot(layout.particles));
+        let end = (first + slices * crate::lane::SLICE).min(Layout::slot(layout.particles));
         first..end
     };
     let slabs = || (0..layout.slabs()).collect::<Vec<_>>();
@@ -71,9 +71,9 @@ pub fn project(
         }
         (inertia, torque)
     });
-    let (inertia, torque) = sums.into_iter().fold(([[0.0; 3]; 3], [0.0; 3]), |s, p| {
-        (add9(&s.0, &p.0), add3(s.1, p.1))
-    });
+    let (inertia, torque) = sums
+        .into_iter()
+        .fold(([[0.0; 3]; 3], [0.0; 3]), |s, p| (add9(&s.0, &p.0), add3(s.1, p.1)));
     let inertia = nalgebra::Matrix3::from_fn(|r, c| inertia[r][c]);
     let torque = nalgebra::Vector3::from(torque);
     // A body of three dimensions has a regular inertia.

@@ -9,16 +9,11 @@ use crate::math::*;
 /// phi(y) = (y^2 + 2 y)/(y^2 + y + 2) with y the admissible over the reconstructed difference.
 #[inline(always)]
 pub fn venkatakrishnan<T: Lane>(rise: T, fall: T, step: T) -> T {
-    let s = T::splat;
     let admissible = step.if_positive(rise, -fall);
     let magnitude = step.max(-step);
-    let (a2, ab, b2) = (
-        admissible * admissible,
-        admissible * magnitude,
-        magnitude * magnitude,
-    );
-    let tiny = s(1e-300);
-    (a2 + s(2.0) * ab + tiny) / (a2 + ab + s(2.0) * b2 + tiny)
+    let (a2, ab, b2) = (admissible * admissible, admissible * magnitude, magnitude * magnitude);
+    let (two, tiny) = (step.of(2.0), step.of(1e-300));
+    (a2 + two * ab + tiny) / (a2 + ab + two * b2 + tiny)
 }
 
 /// v_R - v_L with the change of each side limited by half the jump: the normal part by minmod, the
@@ -32,19 +27,23 @@ pub fn minmod_jump<T: Lane>(
     half_a: Vec3<T>,
     half_b: Vec3<T>,
 ) -> Vec3<T> {
-    let s = T::splat;
-    let tiny = s(1e-300);
-    let inverse = s(1.0) / (dx2 + tiny);
+    let (one, tiny) = (dx2.of(1.0), dx2.of(1e-300));
+    let inverse = one / (dx2 + tiny);
     // Components along dx, as multiples of dx.
-    let normal = |v: Vec3<T>| dot(v, dx) * inverse;
-    let jump_n = normal(dv);
-    let share = |part: T, whole2: T| (part / (whole2 + tiny)).max(s(0.0)).min(s(0.5));
-    let (na, nb) = (normal(half_a), normal(half_b));
-    let keep_n = s(1.0) - share(na * jump_n, jump_n * jump_n) - share(nb * jump_n, jump_n * jump_n);
+    let jump_n = dot(dv, dx) * inverse;
+    let (na, nb) = (dot(half_a, dx) * inverse, dot(half_b, dx) * inverse);
+    let n2 = jump_n * jump_n;
+    let keep_n = one - share(na * jump_n, n2) - share(nb * jump_n, n2);
     let dv_t = axpy3(dv, -jump_n, dx);
     let t2 = dot(dv_t, dv_t);
-    let keep_t = s(1.0) - share(dot(half_a, dv_t), t2) - share(dot(half_b, dv_t), t2);
+    let keep_t = one - share(dot(half_a, dv_t), t2) - share(dot(half_b, dv_t), t2);
     axpy3(scale3(keep_t, dv_t), keep_n * jump_n, dx)
+}
+
+/// part / whole in [0, 1/2]; 0 where the whole vanishes.
+#[inline(always)]
+fn share<T: Lane>(part: T, whole: T) -> T {
+    (part / (whole + part.of(1e-300))).max(part.of(0.0)).min(part.of(0.5))
 }
 
 #[cfg(test)]

@@ -2,5 +2,6 @@
 
 pub mod angular_momentum;
 pub mod limiter;
+mod passes;
 pub mod riemann;
 pub mod url;

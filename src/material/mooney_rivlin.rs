@@ -37,25 +37,25 @@ impl Material for MooneyRivlin {
     /// [URL22] eqs. 5 to 8.
     #[inline(always)]
     fn stress<T: Lane>(&self, f: &Mat3<T>, h: &Mat3<T>, j: T) -> Stress<T> {
-        let s = T::splat;
-        let (zeta, xi, kappa) = (s(self.zeta), s(self.xi), s(self.moduli.kappa));
+        let token = j.token();
+        let (zeta, xi, kappa) = (T::splat(token, self.zeta), T::splat(token, self.xi), T::splat(token, self.moduli.kappa));
         let j_third = j.inverse_cbrt();
         let j_two_thirds = j_third * j_third; // J^(-2/3)
-        let inverse_j = s(1.0) / j;
+        let inverse_j = T::splat(token, 1.0) / j;
         let (ff, hh) = (double_dot(f, f), double_dot(h, h));
         let root_hh = hh.sqrt();
         let xi_j2 = xi * inverse_j * inverse_j;
-        let volumetric = j - s(1.0);
-        let sigma_f = scale9(s(2.0) * zeta * j_two_thirds, f);
-        let sigma_h = scale9(s(3.0) * xi_j2 * root_hh, h);
-        let distortion = s(-2.0 / 3.0) * zeta * j_two_thirds * ff - s(2.0) * xi_j2 * hh * root_hh;
+        let volumetric = j - T::splat(token, 1.0);
+        let sigma_f = scale9(T::splat(token, 2.0) * zeta * j_two_thirds, f);
+        let sigma_h = scale9(T::splat(token, 3.0) * xi_j2 * root_hh, h);
+        let distortion = T::splat(token, -2.0 / 3.0) * zeta * j_two_thirds * ff - T::splat(token, 2.0) * xi_j2 * hh * root_hh;
         let sigma_j = distortion.mul_add(inverse_j, kappa * volumetric);
-        let rest = s(3.0 * (self.zeta + 3f64.sqrt() * self.xi));
+        let rest = T::splat(token, 3.0 * (self.zeta + 3f64.sqrt() * self.xi));
         Stress {
             p: axpy9(&add9(&sigma_f, &tensor_cross(&sigma_h, f)), sigma_j, h),
             sigma_j,
             energy: zeta * j_two_thirds * ff + xi_j2 * hh * root_hh - rest
-                + s(0.5) * kappa * volumetric * volumetric,
+                + T::splat(token, 0.5) * kappa * volumetric * volumetric,
         }
     }
 }

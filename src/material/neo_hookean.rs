@@ -21,18 +21,18 @@ impl Material for NeoHookean {
     /// [URL22] eqs. 5 to 8.
     #[inline(always)]
     fn stress<T: Lane>(&self, f: &Mat3<T>, h: &Mat3<T>, j: T) -> Stress<T> {
-        let s = T::splat;
-        let (mu, kappa) = (s(self.0.mu), s(self.0.kappa));
+        let token = j.token();
+        let (mu, kappa) = (T::splat(token, self.0.mu), T::splat(token, self.0.kappa));
         let j_third = j.inverse_cbrt();
         let j_two_thirds = j_third * j_third; // J^(-2/3)
         let ff = double_dot(f, f);
-        let volumetric = j - s(1.0);
+        let volumetric = j - T::splat(token, 1.0);
         let mu_j = mu * j_two_thirds;
-        let sigma_j = kappa * volumetric - mu_j * ff / (s(3.0) * j);
+        let sigma_j = kappa * volumetric - mu_j * ff / (T::splat(token, 3.0) * j);
         Stress {
             p: axpy9(&scale9(mu_j, f), sigma_j, h),
             sigma_j,
-            energy: s(0.5) * (mu * (j_two_thirds * ff - s(3.0)) + kappa * volumetric * volumetric),
+            energy: T::splat(token, 0.5) * (mu * (j_two_thirds * ff - T::splat(token, 3.0)) + kappa * volumetric * volumetric),
         }
     }
 }
