@@ -20,9 +20,11 @@ pub fn demo(sh: &Shell) -> Result<()> {
     sh.create_dir(&out)?;
     let fmu = out.join("column.fmu");
     cmd!(sh, "{urlsph} fmu {SCENE} --output {fmu} --fmi 3").run()?;
+    let alone = out.join("alone");
+    cmd!(sh, "{urlsph} run {SCENE} --out {alone}").run()?;
     cmd!(
         sh,
-        "{python} examples/demo/cosimulate.py --fmu {fmu} --out {out}"
+        "{python} examples/demo/cosimulate.py --fmu {fmu} --alone {alone} --out {out}"
     )
     .run()?;
     println!(

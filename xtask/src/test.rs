@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::ffi_tests::ffi_tests;
+use crate::output_tests::output_tests;
 use crate::tally::Tally;
 
 /// A part of the tests: what it is called and how it is run.
@@ -16,6 +18,8 @@ const PARTS: &[Part] = &[
     ("lints", lints),
     ("documentation", documentation),
     ("rust", rust),
+    ("output files", output_tests),
+    ("C, C++, Python", ffi_tests),
 ];
 
 pub fn test(sh: &Shell) -> Result<()> {
