@@ -52,16 +52,20 @@ impl Setup {
     fn new(sh: &Shell) -> Result<Self> {
         let python = venv::python(sh)?;
         let tools = python.parent().context("an interpreter lies in a folder")?;
+        let build = project::target().join("ffi-tests");
+        let destdir = build.join("destdir");
         let setup = Self {
-            prefix: project::target().join("ffi-prefix"),
-            build: project::target().join("ffi-tests"),
+            prefix: destdir.join("opt").join("urlsph"),
+            build,
             tools: tools.to_owned(),
             python,
         };
         // What an older version has left there must not help.
-        sh.remove_path(&setup.prefix)?;
-        sh.create_dir(&setup.build)?;
-        install::install_to(sh, &setup.prefix)?;
+        sh.remove_path(&destdir)?;
+        // As packagers do it; that the programs find the library here and not under /opt shows that
+        // the installation can be moved.
+        let destdir = destdir.to_str().context("the path is not UTF-8")?;
+        install::install(sh, &["--prefix", "/opt/urlsph", "--destdir", destdir])?;
         Ok(setup)
     }
 
@@ -80,13 +84,8 @@ impl Setup {
         Tally::run(command)
     }
 
-    /// The installation as packagers make it, and what pkg-config says about it.
+    /// What is installed, and what pkg-config says about it.
     fn check_installation(&self, sh: &Shell) -> Result<()> {
-        let destdir = self.build.join("destdir");
-        sh.remove_path(&destdir)?;
-        let folder = destdir.to_str().context("the path is not UTF-8")?;
-        install::install(sh, &["--prefix", "/opt/urlsph", "--destdir", folder])?;
-        let root = destdir.join("opt").join("urlsph");
         for file in [
             "include/urlsph.h",
             "include/urlsph.hpp",
@@ -97,7 +96,7 @@ impl Setup {
             "share/licenses/urlsph/LICENSE-MIT",
             "share/licenses/urlsph/LICENSE-APACHE",
         ] {
-            ensure!(root.join(file).is_file(), "{file} is not installed");
+            ensure!(self.prefix.join(file).is_file(), "{file} is not installed");
         }
         let version = self.pkg_config(sh, &["--modversion"])?;
         ensure!(

@@ -75,7 +75,7 @@ pub fn install(sh: &Shell, arguments: &[&str]) -> Result<()> {
 }
 
 /// Builds the library in release and installs it under `prefix`.
-pub fn install_to(sh: &Shell, prefix: &Path) -> Result<()> {
+fn install_to(sh: &Shell, prefix: &Path) -> Result<()> {
     let shared = SharedLibrary::of_this_platform()?;
     cmd!(sh, "cargo build --release --package urlsph --lib").run()?;
     let built = project::target().join("release");
