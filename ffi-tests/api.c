@@ -1,10 +1,12 @@
 /* The contract of the C ABI: every function, and every way in which a call can be wrong. */
 
+#include <dirent.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <time.h>
 
 #include <urlsph.h>
 
@@ -887,6 +889,31 @@ static void number_of_threads(void) {
     }
 }
 
+/* Threads of this process; 0 where nobody tells. */
+static size_t threads_now(void) {
+    DIR *folder = opendir("/proc/self/task");
+    if (!folder) return 0;
+    size_t count = 0;
+    while (readdir(folder)) ++count;
+    closedir(folder);
+    return count;
+}
+
+/* A host may unload the library right after the last simulation: no thread may be left in its code. */
+static void threads_end(void) {
+    const size_t before = threads_now();
+    for (int i = 0; i < 20; ++i) {
+        urlsph_simulation *s = create(NULL, 8);
+        CHECK(s && urlsph_step(s, 1e-5) == URLSPH_OK);
+        CHECK(before == 0 || threads_now() == before + 8);
+        CHECK(urlsph_destroy(s) == URLSPH_OK);
+        /* The kernel may list a thread for a moment after it was waited for. */
+        const struct timespec moment = {0, 1000000};
+        for (int wait = 0; wait < 1000 && threads_now() != before; ++wait) nanosleep(&moment, NULL);
+        CHECK(threads_now() == before);
+    }
+}
+
 static void divergence(void) {
     urlsph_simulation *s = create(NULL, 2);
     CHECK(s);
@@ -933,6 +960,7 @@ int main(int argc, char **argv) {
     RUN(busy);
     RUN(many_threads);
     RUN(number_of_threads);
+    RUN(threads_end);
     RUN(divergence);
     return check_summary();
 }

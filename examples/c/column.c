@@ -25,7 +25,7 @@
 #include <urlsph.h>
 
 /* Steps of the communication with the outside, and how many of them. */
-#define STEP 1e-3 /* s */
+#define STEP 5e-3 /* s */
 #define STEPS 20
 
 static void on_log(urlsph_log_level level, const char *message, void *user_data) {

@@ -333,6 +333,14 @@ mod tests {
     }
 
     #[test]
+    fn the_soname_is_the_version_of_the_binary_interface() {
+        assert_eq!(
+            URLSPH_ABI_VERSION.to_string(),
+            env!("CARGO_PKG_VERSION_MAJOR")
+        );
+    }
+
+    #[test]
     fn status_and_code_are_the_same_number() {
         for code in [
             Code::InvalidArgument,

@@ -31,7 +31,7 @@ mod callbacks;
 mod create;
 mod drive;
 mod handle;
-mod panic;
+pub(crate) mod panic;
 mod query;
 mod state;
 mod types;

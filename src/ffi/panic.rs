@@ -12,8 +12,7 @@ use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
-/// Beginning of the names of our pools' threads.
-const THREAD_NAME_PREFIX: &str = "urlsph-";
+use crate::parallel::THREAD_NAME_PREFIX;
 
 thread_local! {
     /// How many guarded calls this thread is in; a callback may call into another handle.
@@ -25,7 +24,7 @@ thread_local! {
 static HOOK: Once = Once::new();
 
 /// Runs `f`; a panic in it comes back as a text with the place in our source.
-pub(super) fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
+pub(crate) fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
     HOOK.call_once(|| {
         let previous = take_hook();
         set_hook(Box::new(move |info| {

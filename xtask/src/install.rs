@@ -17,9 +17,9 @@ const CMAKE: &str = include_str!("../templates/urlsphConfig.cmake.in");
 const CMAKE_VERSION: &str = include_str!("../templates/urlsphConfigVersion.cmake.in");
 
 /// Names of the shared library on this platform.
-struct SharedLibrary {
+pub struct SharedLibrary {
     /// As Cargo builds it, and as the linker looks for it.
-    plain: String,
+    pub plain: String,
     /// As programs look for it at run time.
     soname: String,
     /// As it is stored.
@@ -27,7 +27,8 @@ struct SharedLibrary {
 }
 
 impl SharedLibrary {
-    fn of_this_platform() -> Result<Self> {
+    /// Their names here.
+    pub fn of_this_platform() -> Result<Self> {
         Ok(if cfg!(target_os = "macos") {
             Self {
                 plain: "liburlsph.dylib".into(),
@@ -74,7 +75,7 @@ pub fn install(sh: &Shell, arguments: &[&str]) -> Result<()> {
 }
 
 /// Builds the library in release and installs it under `prefix`.
-pub fn install_to(sh: &Shell, prefix: &Path) -> Result<()> {
+fn install_to(sh: &Shell, prefix: &Path) -> Result<()> {
     let shared = SharedLibrary::of_this_platform()?;
     cmd!(sh, "cargo build --release --package urlsph --lib").run()?;
     let built = project::target().join("release");
