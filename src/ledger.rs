@@ -38,3 +38,32 @@ pub struct Resultant {
     /// Area-weighted mean velocity [m/s].
     pub mean_velocity: [f64; 3],
 }
+
+/// Running totals since time 0: part of the state.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Accounts {
+    /// Energy at time 0 [J].
+    pub initial: f64,
+    /// See [`Energies::external_work`].
+    pub external_work: f64,
+    /// See [`Energies::numerical_dissipation`].
+    pub dissipation: f64,
+    /// See [`Energies::projection`].
+    pub projection: f64,
+}
+
+impl Accounts {
+    /// The ledger with what is stored now.
+    pub fn energies(&self, kinetic: f64, strain: f64) -> Energies {
+        Energies {
+            kinetic,
+            strain,
+            external_work: self.external_work,
+            numerical_dissipation: self.dissipation,
+            projection: self.projection,
+            closure_error: kinetic + strain + self.dissipation + self.projection
+                - self.external_work
+                - self.initial,
+        }
+    }
+}

@@ -1,23 +1,71 @@
 //! Large-strain solid dynamics by Updated Reference Lagrangian SPH.
+//!
+//! A [`Scene`] (JSON) describes a body; a [`Simulation`] advances it. The path of the data, and
+//! where the equations of [URL22] (de Campos, Gil, Lee, Giacomini, Bonet: A new Updated Reference
+//! Lagrangian Smooth Particle Hydrodynamics algorithm, CMAME 392, 2022, 114680) are:
+//!
+//! | what | equations | where |
+//! |---|---|---|
+//! | JSON to a validated scene | | [`scene`] |
+//! | particles, tributary volumes, patches | | `particles` |
+//! | neighbours | | `neighbours` |
+//! | kernel, corrected gradients, pseudo-areas, the four options | 37-52, 58 | `kernel`, `reference` |
+//! | neo-Hookean and Mooney-Rivlin laws | 5-8 | `material` |
+//! | rates of v, f, h, j | 53-57 | `formulation::url` |
+//! | Riemann dissipation and reconstruction | 59, 60 | `formulation::riemann`, `formulation::limiter` |
+//! | Runge-Kutta, time step | 61-63 | `integrator`, `simulation` |
+//! | angular-momentum projection | 64-67 | `formulation::angular_momentum` |
+//! | supports, loads, resultants | | `boundary` |
+//!
+//! ```
+//! use urlsph::{Scene, Simulation};
+//! let scene = Scene::from_json(r#"{
+//!     "geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.25}},
+//!     "material": {"neo_hookean": {"density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3}},
+//!     "boundary": {"y_min": {"support": "clamped"}, "y_max": {"traction": [0, 1e4, 0]}},
+//!     "time": {"end": 0.01}
+//! }"#, &[])?;
+//! let mut simulation = Simulation::new(scene)?;
+//! simulation.advance(0.01)?;
+//! let top = simulation.patch_index("y_max")?;
+//! assert!(simulation.resultant(top).mean_displacement[1] > 0.0);
+//! # Ok::<(), urlsph::Error>(())
+//! ```
 
+mod boundary;
 pub mod error;
 pub mod fields;
 #[cfg(feature = "fmi")]
 #[allow(unsafe_code)] // The C functions of FMI.
 #[path = "../fmu/mod.rs"]
 pub mod fmu;
+mod formulation;
+mod integrator;
+mod kernel;
+mod lane;
+mod layout;
 pub mod ledger;
+mod material;
+mod math;
+mod neighbours;
 pub mod output;
+mod parallel;
+mod particles;
+mod plan;
+mod reference;
 pub mod scene;
 mod simulation;
+mod snapshot;
 
 pub use error::{Code, Error, Result};
 pub use fields::{Configuration, FIELDS, Field, FieldInfo};
 pub use ledger::{Energies, Momenta, Resultant};
+pub use plan::Plan;
 pub use scene::Scene;
 pub use simulation::{
-    Control, Input, Patch, Plan, ProbeMotion, Progress, Quantity, Simulation, Snapshot, View,
+    Control, Input, Patch, ProbeMotion, Progress, Quantity, Simulation, View,
 };
+pub use snapshot::Snapshot;
 
 /// Version of the library, the header and the FMU.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -1,9 +1,22 @@
 //! A running simulation: the time step is written here, once.
 
-use crate::error::Result;
+use crate::boundary::{Boundary, InputValues};
+use crate::error::{Code, Error, Result};
 use crate::fields::Field;
-use crate::ledger::{Energies, Momenta, Resultant};
-use crate::scene::Scene;
+use crate::formulation::angular_momentum;
+use crate::formulation::url::{Breakdown, Evaluation, State, Url};
+use crate::integrator::{ANGULAR_ARMS, SSP_RK3};
+use crate::layout::{Array, Layout};
+use crate::ledger::{Accounts, Energies, Momenta, Resultant};
+use crate::material::Law;
+use crate::math::*;
+use crate::neighbours::Graph;
+use crate::parallel::{self, Pool};
+use crate::particles::Particles;
+use crate::plan::Plan;
+use crate::reference::Reference;
+use crate::scene::{Numerics, ReferenceUpdate, Scene};
+use crate::snapshot::Snapshot;
 
 /// A body in motion. Created from a [`Scene`], advanced in time, read by fields and resultants.
 ///
@@ -11,7 +24,36 @@ use crate::scene::Scene;
 /// steps that it completed: the last good state stays readable.
 #[derive(Debug)]
 pub struct Simulation {
+    // The scene and what follows from it.
     scene: Scene,
+    scene_hash: u64,
+    pool: Pool,
+    boundary: Boundary,
+    probes: Probes,
+    /// Body's particle to caller's, and back.
+    order: Vec<u32>,
+    rank: Vec<u32>,
+    // The state: what a snapshot copies, with the fields of the updated reference.
+    time: f64,
+    steps: u64,
+    state: State,
+    reference: Reference,
+    inputs: InputValues,
+    accounts: Accounts,
+    // Scratch: recomputed from the state.
+    url: Url,
+    start: State,
+    velocity_before: Option<Array<3>>,
+    evaluation: Evaluation,
+    resultants: Vec<Resultant>,
+    generation: u64,
+}
+
+/// Named points and the particles that they are interpolated from.
+#[derive(Debug)]
+struct Probes {
+    names: Vec<String>,
+    weights: Vec<Vec<(u32, f64)>>,
 }
 
 /// What an observer of [`Simulation::advance_with`] answers.
@@ -123,209 +165,596 @@ pub struct View<'a> {
     pub order: &'a [u32],
 }
 
-/// A complete state: restoring it and stepping gives the same bits as never having left.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Snapshot {}
-
-impl Snapshot {
-    /// Bytes, versioned and checksummed, little-endian.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        todo!()
-    }
-    /// Reads what [`to_bytes`](Self::to_bytes) wrote.
-    ///
-    /// # Errors
-    /// [`Code::Snapshot`](crate::Code::Snapshot) if truncated, damaged or of another version.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
-        let _ = bytes;
-        todo!()
-    }
-}
-
-/// What a scene will cost, for `urlsph check`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    /// Particles.
-    pub particles: usize,
-    /// Directed neighbour pairs.
-    pub pairs: usize,
-    /// Smallest, mean and largest number of neighbours.
-    pub neighbours: (usize, f64, usize),
-    /// Stable time step at the start [s].
-    pub stable_step: f64,
-    /// Estimated number of steps to the scene's end.
-    pub steps: u64,
-    /// Memory of the simulation [bytes].
-    pub memory: usize,
-    /// Physics and options that are on, one line each.
-    pub on: Vec<String>,
-    /// Physics and options that are off, one line each.
-    pub off: Vec<String>,
-}
-
 impl Simulation {
     /// Sets up a simulation on a pool of its own with as many threads as the machine has cores.
     ///
     /// # Errors
-    /// [`Code::InvalidScene`](crate::Code::InvalidScene) with the JSON path or particle,
-    /// [`Code::OutOfMemory`](crate::Code::OutOfMemory).
+    /// [`Code::InvalidScene`] with the JSON path or particle, [`Code::OutOfMemory`].
     pub fn new(scene: Scene) -> Result<Self> {
         Self::with_threads(scene, 0)
     }
+
     /// The same with a given number of threads; 0 means as many as the machine has cores.
     ///
     /// # Errors
     /// As [`new`](Self::new).
     pub fn with_threads(scene: Scene, threads: usize) -> Result<Self> {
-        let _ = threads;
-        Ok(Self { scene })
+        scene.validate()?;
+        let pool = Pool::new(threads)?;
+        let particles = Particles::new(&scene)?;
+        let boundary = Boundary::new(&scene, &particles)?;
+        let probes = Probes::new(&scene, &particles)?;
+        let law = Law::new(&scene.material);
+        let numerics = &scene.numerics;
+        let (reference, state, url) = pool.install(|| -> Result<_> {
+            let graph = Graph::new(&particles, numerics.neighbours)?;
+            let reference = Reference::new(&particles, &graph, numerics)?;
+            let state = initial_state(&scene, &reference, &particles)?;
+            let url = Url::new(&reference, law, numerics);
+            Ok((reference, state, url))
+        })?;
+        let mut this = Self {
+            scene_hash: crate::snapshot::scene_hash(&scene),
+            pool,
+            probes,
+            order: particles.order,
+            rank: particles.rank,
+            time: 0.0,
+            steps: 0,
+            inputs: boundary.start_values(),
+            boundary,
+            accounts: Accounts::default(),
+            start: state.clone(),
+            velocity_before: numerics.angular_momentum_projection.then(|| state.v.clone()),
+            state,
+            reference,
+            url,
+            evaluation: Evaluation::default(),
+            resultants: Vec::new(),
+            generation: 0,
+            scene,
+        };
+        this.boundary.constrain(&mut this.state.v, 0.0, &this.inputs)?;
+        this.evaluate()?;
+        this.accounts.initial = this.evaluation.kinetic + this.evaluation.strain;
+        this.resultants = this.compute_resultants()?;
+        Ok(this)
     }
+
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
+
     /// Number of threads of this simulation's pool.
     pub fn threads(&self) -> usize {
-        todo!()
+        self.pool.threads()
     }
+
     /// What the scene costs.
     pub fn plan(&self) -> Plan {
-        todo!()
+        let (fewest, most) = self.reference.neighbour_range;
+        let dt = self.stable_step();
+        let (on, off) = crate::plan::features(&self.scene);
+        Plan {
+            particles: self.particle_count(),
+            pairs: self.pair_count(),
+            neighbours: (fewest, self.pair_count() as f64 / self.particle_count() as f64, most),
+            stable_step: dt,
+            steps: (self.scene.time.end / dt).ceil() as u64,
+            memory: self.memory(),
+            on,
+            off,
+        }
     }
+
+    /// Memory held by the simulation [bytes].
+    pub fn memory(&self) -> usize {
+        self.reference.bytes()
+            + self.state.bytes()
+            + self.start.bytes()
+            + self.velocity_before.as_ref().map_or(0, Array::bytes)
+            + self.url.bytes()
+            + std::mem::size_of_val(&self.order[..])
+            + std::mem::size_of_val(&self.rank[..])
+    }
+
     /// Simulated time [s].
     pub fn time(&self) -> f64 {
-        todo!()
+        self.time
     }
+
     /// Time steps since time 0.
     pub fn steps(&self) -> u64 {
-        todo!()
+        self.steps
     }
+
     /// Number of particles.
     pub fn particle_count(&self) -> usize {
-        todo!()
+        self.reference.layout.particles
     }
+
     /// Number of directed neighbour pairs.
     pub fn pair_count(&self) -> usize {
-        todo!()
+        self.reference.pairs
     }
-    /// Largest stable step from the present state [s] (the CFL condition, or the scene's fixed step).
+
+    /// Largest stable step from the present state [s]: the scene's fixed step, or
+    /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63).
     pub fn stable_step(&self) -> f64 {
-        todo!()
+        let numerics = &self.scene.numerics;
+        numerics.time_step.unwrap_or_else(|| {
+            numerics.cfl_number() * self.evaluation.length / self.url.wave_speeds().pressure
+        })
     }
+
     /// Advances to exactly `t_next`, in as many stable steps as needed.
     ///
     /// # Errors
-    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) unless `t_next` is finite and later than now;
-    /// [`Code::Diverged`](crate::Code::Diverged) with particle, position, field and time: the state is the last good one.
+    /// [`Code::InvalidArgument`] unless `t_next` is finite and later than now;
+    /// [`Code::Diverged`] with particle, position, field and time: the state is the last good one.
     pub fn advance(&mut self, t_next: f64) -> Result<()> {
         self.advance_with(t_next, &mut |_| Control::Continue)
     }
+
     /// The same, with an observer that is called after every step and may cancel.
     ///
     /// # Errors
-    /// As [`advance`](Self::advance), and [`Code::Cancelled`](crate::Code::Cancelled).
+    /// As [`advance`](Self::advance), and [`Code::Cancelled`].
     pub fn advance_with(
         &mut self,
         t_next: f64,
         observer: &mut dyn FnMut(&Progress) -> Control,
     ) -> Result<()> {
-        let _ = (t_next, observer);
-        todo!()
+        if !(t_next.is_finite() && t_next > self.time) {
+            return Err(Error::argument(format!(
+                "cannot advance to {t_next} s: give a finite time later than now, {} s",
+                self.time
+            ))
+            .at_time(self.time));
+        }
+        self.take_over_inputs()?;
+        let outcome = self.steps_until(t_next, observer);
+        self.resultants = self.compute_resultants()?;
+        outcome
     }
+
+    fn steps_until(
+        &mut self,
+        t_next: f64,
+        observer: &mut dyn FnMut(&Progress) -> Control,
+    ) -> Result<()> {
+        while self.time < t_next {
+            let (stable, remaining) = (self.stable_step(), t_next - self.time);
+            let last = remaining <= stable;
+            // Two equal steps instead of a full one and a splinter.
+            let dt = if last { remaining } else { stable.min(0.5 * remaining) };
+            let time = if last { t_next } else { self.time + dt };
+            if time <= self.time {
+                return Err(Error::new(
+                    Code::Diverged,
+                    format!(
+                        "the stable step, {stable:e} s, is too small to advance the time: the body \
+                         is compressed beyond what its particles resolve; refine the spacing or \
+                         reduce the load"
+                    ),
+                )
+                .at_time(self.time));
+            }
+            self.step(dt, time)?;
+            let progress = Progress { time: self.time, end: t_next, dt, steps: self.steps };
+            if observer(&progress) == Control::Cancel {
+                return Err(Error::new(Code::Cancelled, "cancelled by the caller").at_time(self.time));
+            }
+        }
+        Ok(())
+    }
+
+    /// THE time step: three stages of rates, loads, blend, supports.
+    fn step(&mut self, dt: f64, end: f64) -> Result<()> {
+        self.start.copy_from(&self.state);
+        let accounts = self.accounts;
+        match self.stages(dt, end) {
+            Ok(()) => {
+                self.time = end;
+                self.steps += 1;
+                self.generation += 1;
+                Ok(())
+            }
+            Err(error) => {
+                self.state.copy_from(&self.start);
+                self.accounts = accounts;
+                self.evaluate()?;
+                Err(error)
+            }
+        }
+    }
+
+    fn stages(&mut self, dt: f64, end: f64) -> Result<()> {
+        let Self { pool, boundary, state, reference, inputs, accounts, url, start, .. } = self;
+        let before = self.velocity_before.as_mut();
+        let evaluation = &mut self.evaluation;
+        let (time, steps, numerics) = (self.time, self.steps + 1, &self.scene.numerics);
+        let order = &self.order;
+        pool.install(|| {
+            let diverged = |b: Breakdown, state: &State| diverged(b, state, order, end);
+            let mut before = before;
+            let held = boundary.constrained_kinetic(&state.v);
+            for (i, stage) in SSP_RK3.into_iter().enumerate() {
+                let stage_time = time + stage.time * dt;
+                let share = stage.weight * dt;
+                if let Some(before) = &mut before {
+                    let factors = ANGULAR_ARMS[i].map(|c| c * dt);
+                    let density = url.law().density();
+                    let power = angular_momentum::project(
+                        &mut url.rates.force, state, start, before, factors, density, reference,
+                    );
+                    accounts.projection -= share * power;
+                    before.copy_from(&state.v);
+                }
+                let mut force = std::mem::replace(&mut url.rates.force, Array::empty());
+                let power = boundary.add_loads(&mut force, url, state, reference, stage_time, inputs);
+                url.rates.force = force;
+                accounts.external_work += share
+                    * (power? - boundary.constrained_power(&url.rates.force, &state.v));
+                accounts.dissipation += share * evaluation.dissipation;
+                url.advance_stage(state, start, reference, (stage.keep, stage.take), dt);
+                let next = SSP_RK3.get(i + 1).map_or(end, |next| time + next.time * dt);
+                boundary.constrain(&mut state.v, next, inputs)?;
+                if i + 1 == SSP_RK3.len() && is_stale(numerics, steps) {
+                    url.update_reference(state, reference).map_err(|b| diverged(b, state))?;
+                }
+                *evaluation = url.evaluate(state, reference).map_err(|b| diverged(b, state))?;
+            }
+            // What the supports did: they held the constrained components against all forces.
+            accounts.external_work += boundary.constrained_kinetic(&state.v) - held;
+            Ok(())
+        })
+    }
+
+    /// Rates of the present state.
+    fn evaluate(&mut self) -> Result<()> {
+        let Self { pool, url, state, reference, .. } = self;
+        self.evaluation = pool
+            .install(|| url.evaluate(state, reference))
+            .map_err(|b| diverged(b, &self.state, &self.order, self.time))?;
+        Ok(())
+    }
+
+    /// An external velocity that was set since the last step acts at once, as an impulse.
+    fn take_over_inputs(&mut self) -> Result<()> {
+        let held = self.boundary.constrained_kinetic(&self.state.v);
+        let old = self.state.v.clone();
+        let changed = self
+            .boundary
+            .constrain(&mut self.state.v, self.time, &self.inputs)
+            .inspect_err(|_| self.state.v.copy_from(&old))?;
+        if changed {
+            self.accounts.external_work += self.boundary.constrained_kinetic(&self.state.v) - held;
+            self.generation += 1;
+            self.evaluate()?;
+        }
+        Ok(())
+    }
+
+    fn compute_resultants(&self) -> Result<Vec<Resultant>> {
+        let now = (self.time, self.stable_step());
+        self.pool.install(|| {
+            self.boundary.resultants(&self.url, &self.state, &self.reference, now, &self.inputs)
+        })
+    }
+
     /// Energies now.
     pub fn energies(&self) -> Energies {
-        todo!()
+        self.accounts.energies(self.evaluation.kinetic, self.evaluation.strain)
     }
+
     /// Momenta now.
     pub fn momenta(&self) -> Momenta {
-        todo!()
+        let density = self.url.law().density();
+        let (x, v) = (self.state.x.components(), self.state.v.components());
+        let volume = self.reference.volume.components()[0];
+        let mut momenta = Momenta::default();
+        for a in (0..self.particle_count()).map(Layout::slot) {
+            let p = [0, 1, 2].map(|c| density * volume[a] * v[c][a]);
+            momenta.linear = add3(momenta.linear, p);
+            momenta.angular = add3(momenta.angular, cross([x[0][a], x[1][a], x[2][a]], p));
+        }
+        momenta
     }
+
     /// The patches: every face of the geometry and every patch of the scene.
     pub fn patches(&self) -> &[Patch] {
-        todo!()
+        &self.boundary.patches
     }
+
     /// Index of a patch.
     ///
     /// # Errors
-    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) naming the patches that there are.
+    /// [`Code::InvalidArgument`] naming the patches that there are.
     pub fn patch_index(&self, name: &str) -> Result<usize> {
-        let _ = name;
-        todo!()
+        self.patches().iter().position(|p| p.name == name).ok_or_else(|| {
+            let names: Vec<&str> = self.patches().iter().map(|p| p.name.as_str()).collect();
+            Error::argument(format!("there is no patch `{name}`; there are {}", names.join(", ")))
+                .at_boundary(name)
+        })
     }
-    /// Resultants of a patch now.
+
+    /// Resultants of a patch now: what its own conditions exert, and its mean motion.
     ///
     /// # Panics
     /// If `patch` is not an index into [`patches`](Self::patches).
     pub fn resultant(&self, patch: usize) -> Resultant {
-        let _ = patch;
-        todo!()
+        self.resultants[patch]
     }
+
     /// Names of the scene's probes, in the order of [`probe`](Self::probe).
     pub fn probe_names(&self) -> &[String] {
-        todo!()
+        &self.probes.names
     }
+
     /// Motion of a probe, interpolated between the particles around its initial position.
     ///
     /// # Panics
     /// If `probe` is not an index into [`probe_names`](Self::probe_names).
     pub fn probe(&self, probe: usize) -> ProbeMotion {
-        let _ = probe;
-        todo!()
+        let mut motion = ProbeMotion { displacement: [0.0; 3], velocity: [0.0; 3] };
+        for &(particle, weight) in &self.probes.weights[probe] {
+            let slot = Layout::slot(particle as usize);
+            let u = sub3(self.state.x.get(slot), self.reference.x_initial.get(slot));
+            motion.displacement = axpy3(motion.displacement, weight, u);
+            motion.velocity = axpy3(motion.velocity, weight, self.state.v.get(slot));
+        }
+        motion
     }
+
     /// What the scene lets the outside set.
     pub fn inputs(&self) -> &[Input] {
-        todo!()
+        &self.boundary.inputs
     }
+
     /// Sets an external input: one value for the patch (`components` numbers) or one per particle
     /// of the patch (`particles x components`, row-major, in the order of [`Patch::particles`]).
+    /// It holds from now on until it is set again.
     ///
     /// # Errors
-    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) if the scene does not declare this input as `external`,
+    /// [`Code::InvalidArgument`] if the scene does not declare this input as `external`,
     /// if the length is neither, or if a value is not finite. Nothing is changed then.
     pub fn set_input(&mut self, patch: usize, quantity: Quantity, values: &[f64]) -> Result<()> {
-        let _ = (patch, quantity, values);
-        todo!()
+        let index = self.boundary.input_index(patch, quantity)?;
+        self.boundary.check_input(index, values)?;
+        self.inputs[index].clear();
+        self.inputs[index].extend_from_slice(values);
+        self.generation += 1;
+        self.resultants = self.compute_resultants()?;
+        Ok(())
     }
+
     /// The present values of an external input, as last set.
     ///
     /// # Errors
-    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) if the scene does not declare it.
+    /// [`Code::InvalidArgument`] if the scene does not declare it.
     pub fn input(&self, patch: usize, quantity: Quantity) -> Result<&[f64]> {
-        let _ = (patch, quantity);
-        todo!()
+        Ok(&self.inputs[self.boundary.input_index(patch, quantity)?])
     }
+
     /// Copies a field, row-major, in the caller's particle order.
     ///
     /// # Errors
-    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) unless `out` has `particles x components` numbers.
+    /// [`Code::InvalidArgument`] unless `out` has `particles x components` numbers.
     pub fn read_field(&self, field: Field, out: &mut [f64]) -> Result<()> {
-        let _ = (field, out);
-        todo!()
+        let n = field.info().components;
+        let expected = n * self.particle_count();
+        if out.len() != expected {
+            return Err(Error::argument(format!(
+                "the buffer holds {} numbers, the field has {} particles x {n} = {expected}",
+                out.len(),
+                self.particle_count()
+            ))
+            .at_field(field.info().name));
+        }
+        self.pool.install(|| {
+            let force = match field {
+                Field::NodalForce => {
+                    let now = (self.time, self.stable_step());
+                    let (url, state) = (&self.url, &self.state);
+                    Some(self.boundary.nodal_forces(url, state, &self.reference, now, &self.inputs)?)
+                }
+                _ => None,
+            };
+            parallel::for_each_row(out, n, |caller, row| {
+                let slot = Layout::slot(self.rank[caller] as usize);
+                row.copy_from_slice(&self.field_at(field, slot, force.as_ref())[..n]);
+            });
+            Ok(())
+        })
     }
+
+    /// Value of a field at a slot; unused components are 0.
+    fn field_at(&self, field: Field, slot: usize, force: Option<&Array<3>>) -> [f64; 9] {
+        let vector = |v: [f64; 3]| [v[0], v[1], v[2], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let scalar = |s: f64| vector([s, 0.0, 0.0]);
+        let tensor = |t: &Mat3<f64>| *t.as_flattened().first_chunk().expect("nine components");
+        let (x, x_initial) = (self.state.x.get(slot), self.reference.x_initial.get(slot));
+        match field {
+            Field::InitialPosition => return vector(x_initial),
+            Field::Position => return vector(x),
+            Field::Displacement => return vector(sub3(x, x_initial)),
+            Field::Velocity => return vector(self.state.v.get(slot)),
+            Field::InitialVolume => return scalar(self.reference.volume.get(slot)[0]),
+            Field::NodalForce => return vector(force.expect("computed for this field").get(slot)),
+            _ => {}
+        }
+        let deformation = self.url.deformation(&self.state, &self.reference, slot);
+        let point = self.url.law().at(&deformation);
+        let trace = point.cauchy[0][0] + point.cauchy[1][1] + point.cauchy[2][2];
+        match field {
+            Field::DeformationGradient => tensor(&deformation.f),
+            Field::Jacobian => scalar(deformation.j),
+            Field::FirstPiolaStress => tensor(&point.first_piola),
+            Field::CauchyStress => tensor(&point.cauchy),
+            Field::Pressure => scalar(-trace / 3.0),
+            Field::VonMisesStress => {
+                let deviator = axpy9(&point.cauchy, -trace / 3.0, &identity());
+                scalar((1.5 * double_dot(&deviator, &deviator)).sqrt())
+            }
+            Field::StrainEnergyDensity => scalar(point.energy),
+            Field::Density => scalar(self.url.law().density() / deformation.j),
+            _ => unreachable!("answered above"),
+        }
+    }
+
     /// A view of a state array; `None` for fields that are computed on demand.
     /// Position, velocity and initial position have one.
     pub fn view(&self, field: Field) -> Option<View<'_>> {
-        let _ = field;
-        todo!()
+        let array = match field {
+            Field::Position => &self.state.x,
+            Field::Velocity => &self.state.v,
+            Field::InitialPosition => &self.reference.x_initial,
+            _ => return None,
+        };
+        Some(View {
+            data: &array.flat()[Layout::FIRST..],
+            component_stride: array.component_stride(),
+            components: 3,
+            particles: self.particle_count(),
+            order: &self.order,
+        })
     }
+
     /// Changes whenever the state does: a view taken at another generation is stale.
     pub fn generation(&self) -> u64 {
-        todo!()
+        self.generation
     }
+
     /// A copy of the complete state.
     pub fn snapshot(&self) -> Snapshot {
-        todo!()
+        Snapshot {
+            scene_hash: self.scene_hash,
+            time: self.time,
+            steps: self.steps,
+            accounts: self.accounts,
+            inputs: self.inputs.clone(),
+            state: self.state.clone(),
+            updated: self.reference.updated.clone(),
+        }
     }
+
     /// Returns to a snapshot of the same scene; bit for bit.
     ///
     /// # Errors
-    /// [`Code::Snapshot`](crate::Code::Snapshot) if it belongs to another scene; nothing is changed then.
+    /// [`Code::Snapshot`] if it belongs to another scene; nothing is changed then.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<()> {
-        let _ = snapshot;
-        todo!()
+        if snapshot.scene_hash != self.scene_hash {
+            return Err(Error::new(
+                Code::Snapshot,
+                "the snapshot belongs to another scene: restore it into a simulation of its own scene",
+            ));
+        }
+        let same_shape = snapshot.state.x.layout() == self.state.x.layout()
+            && snapshot.state.h.is_some() == self.state.h.is_some()
+            && snapshot.state.j.is_some() == self.state.j.is_some()
+            && snapshot.updated.is_some() == self.reference.updated.is_some()
+            && snapshot.inputs.len() == self.inputs.len();
+        if !same_shape {
+            return Err(Error::new(Code::Snapshot, "the snapshot lacks fields of its scene: it is damaged"));
+        }
+        let now = self.snapshot();
+        self.put(snapshot).inspect_err(|_| self.put(&now).expect("the present state was good"))
     }
+
+    fn put(&mut self, snapshot: &Snapshot) -> Result<()> {
+        for (index, values) in snapshot.inputs.iter().enumerate() {
+            self.boundary.check_input(index, values)?;
+        }
+        self.time = snapshot.time;
+        self.steps = snapshot.steps;
+        self.accounts = snapshot.accounts;
+        self.inputs.clone_from(&snapshot.inputs);
+        self.state.copy_from(&snapshot.state);
+        if snapshot.updated.is_some() && snapshot.updated != self.reference.updated {
+            self.reference.updated.clone_from(&snapshot.updated);
+            let Self { pool, reference, .. } = self;
+            pool.install(|| reference.rebuild()).map_err(|slot| {
+                Error::new(Code::Snapshot, "the reference configuration of the snapshot is damaged")
+                    .at_particle(self.order[slot - Layout::FIRST] as usize, None)
+            })?;
+        }
+        self.generation += 1;
+        self.evaluate()?;
+        self.resultants = self.compute_resultants()?;
+        Ok(())
+    }
+
     /// Hash of the complete state: equal states have equal hashes, whatever the number of threads.
     pub fn state_hash(&self) -> u64 {
-        todo!()
+        self.snapshot().hash()
     }
+}
+
+impl Probes {
+    fn new(scene: &Scene, particles: &Particles) -> Result<Self> {
+        let mut this = Self { names: Vec::new(), weights: Vec::new() };
+        for (name, point) in &scene.probes {
+            let weights = particles.lattice.interpolation(*point).ok_or_else(|| {
+                Error::scene(format!("probes.{name}"), "the point lies outside the body")
+            })?;
+            this.names.push(name.clone());
+            this.weights.push(weights);
+        }
+        Ok(this)
+    }
+}
+
+/// Displacement and velocity at time 0; f follows from the positions by the discrete gradient, so
+/// that it is consistent with the operators.
+fn initial_state(scene: &Scene, reference: &Reference, particles: &Particles) -> Result<State> {
+    let mut state = State::at_rest(reference, scene.numerics.state);
+    let finite = |value: [f64; 3], path: &str, i: usize| {
+        if value.iter().all(|v| v.is_finite()) {
+            return Ok(value);
+        }
+        Err(Error::scene(path, "the value is not finite here: check the expression")
+            .at_particle(particles.caller(i), Some(particles.positions[i])))
+    };
+    if let Some(velocity) = &scene.initial.velocity {
+        let velocity = velocity.compile()?;
+        for (i, x) in particles.positions.iter().enumerate() {
+            let v = finite(velocity.eval(*x, 0.0), "initial.velocity", i)?;
+            state.v.set(Layout::slot(i), v);
+        }
+    }
+    if let Some(displacement) = &scene.initial.displacement {
+        let displacement = displacement.compile()?;
+        for (i, x) in particles.positions.iter().enumerate() {
+            let u = finite(displacement.eval(*x, 0.0), "initial.displacement", i)?;
+            state.x.set(Layout::slot(i), add3(*x, u));
+        }
+        crate::formulation::url::deform(&mut state, reference);
+    }
+    Ok(state)
+}
+
+/// Whether the reference is updated after this step.
+fn is_stale(numerics: &Numerics, steps: u64) -> bool {
+    match numerics.reference_update {
+        ReferenceUpdate::Never => false,
+        ReferenceUpdate::EveryStep => true,
+        ReferenceUpdate::Every(n) => steps % u64::from(n) == 0,
+    }
+}
+
+fn diverged(b: Breakdown, state: &State, order: &[u32], time: f64) -> Error {
+    Error::new(
+        Code::Diverged,
+        format!(
+            "the solution broke down: the volume ratio of a particle is {:.3e}. The state before \
+             this step is kept. Try a smaller time step (numerics.cfl), a finer spacing, more \
+             neighbours, or a smaller load",
+            b.jacobian
+        ),
+    )
+    .at_field(Field::Jacobian.info().name)
+    .at_particle(order[b.slot - Layout::FIRST] as usize, Some(state.x.get(b.slot)))
+    .at_time(time)
 }

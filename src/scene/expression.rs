@@ -28,7 +28,11 @@ const CONSTANTS: [(&str, f64); 4] = [
     ("E", std::f64::consts::E),
 ];
 
-const UNARY: [(&str, fn(f64) -> f64); 16] = [
+type Unary = fn(f64) -> f64;
+type Binary = fn(f64, f64) -> f64;
+
+/// Functions of one argument.
+const UNARY: [(&str, Unary); 16] = [
     ("sin", f64::sin),
     ("cos", f64::cos),
     ("tan", f64::tan),
@@ -48,7 +52,7 @@ const UNARY: [(&str, fn(f64) -> f64); 16] = [
 ];
 
 /// Functions of two arguments.
-const BINARY: [(&str, fn(f64, f64) -> f64); 4] = [
+const BINARY: [(&str, Binary); 4] = [
     ("min", min),
     ("max", max),
     ("atan2", f64::atan2),
@@ -81,7 +85,7 @@ struct Operators;
 
 impl MakeOperators<f64> for Operators {
     fn make<'a>() -> Vec<Operator<'a, f64>> {
-        let binary = |apply: fn(f64, f64) -> f64, prio| BinOp {
+        let binary = |apply: Binary, prio| BinOp {
             apply,
             prio,
             is_commutative: false,
@@ -102,7 +106,8 @@ impl MakeOperators<f64> for Operators {
 /// A compiled expression.
 #[derive(Debug, Clone)]
 pub struct Expression {
-    program: FlatEx<f64, Operators>,
+    /// Boxed: `exmex` keeps room for 32 operators, 20 kB, in line.
+    program: Box<FlatEx<f64, Operators>>,
     /// Indices into [`VARIABLES`] of the `count` variables that occur, ascending.
     used: [u8; 4],
     count: usize,
@@ -129,7 +134,7 @@ impl Expression {
             })
             .map_err(|message| format!("in the expression `{text}`: {message}"))?;
         // Constants are not folded: what is evaluated is what was written, in that order.
-        let program = FlatEx::parse_wo_compile(&canonical)
+        let program = FlatEx::<f64, Operators>::parse_wo_compile(&canonical)
             .map_err(|e| format!("in the expression `{text}`: {}", e.msg()))?;
         let mut used = [0; 4];
         for (slot, name) in used.iter_mut().zip(program.var_names()) {
@@ -138,7 +143,7 @@ impl Expression {
         }
         let count = program.var_names().len();
         Ok(Self {
-            program,
+            program: Box::new(program),
             used,
             count,
         })

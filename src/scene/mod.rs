@@ -6,6 +6,7 @@
 mod expression;
 mod parse;
 mod schema;
+mod tree;
 mod validate;
 mod value;
 
@@ -150,10 +151,13 @@ pub enum Material {
 #[serde(deny_unknown_fields)]
 pub struct NeoHookean {
     /// Density in the initial configuration [kg/m^3].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub density: f64,
     /// Young's modulus of the linearised law [Pa].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub youngs_modulus: f64,
     /// Poisson's ratio of the linearised law, in (-1, 0.5).
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
     pub poisson_ratio: f64,
 }
 
@@ -162,13 +166,17 @@ pub struct NeoHookean {
 #[serde(deny_unknown_fields)]
 pub struct MooneyRivlin {
     /// Density in the initial configuration [kg/m^3].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub density: f64,
     /// Young's modulus of the linearised law [Pa].
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub youngs_modulus: f64,
     /// Poisson's ratio of the linearised law, in (-1, 0.5).
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
     pub poisson_ratio: f64,
     /// Share of the shear modulus carried by the H term: 3 sqrt(3) xi / mu, in [0, 1]. Default 0.5.
     #[serde(default = "half")]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub area_share: f64,
 }
 
@@ -199,6 +207,7 @@ pub struct Numerics {
     /// Smoothing factor f_h: h_b = f_h x largest distance to a neighbour ([URL22] 37).
     pub smoothing_factor: f64,
     /// How kernels follow an updated reference ([URL22] 49-52), 1 to 4.
+    #[schemars(range(min = 1, max = 4))]
     pub kernel_option: u8,
     /// When the reference configuration is updated.
     pub reference_update: ReferenceUpdate,
@@ -242,12 +251,19 @@ impl Default for Numerics {
     }
 }
 
+impl Numerics {
+    /// The CFL number: the scene's, or the largest that is proven stable for its neighbours.
+    pub fn cfl_number(&self) -> f64 {
+        self.cfl.unwrap_or(if self.neighbours == Neighbours::Lattice(6) { 0.6 } else { 0.9 })
+    }
+}
+
 /// 6, 18 or 26 lattice neighbours, or `{"radius": r}`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, deny_unknown_fields)]
 pub enum Neighbours {
     /// 6, 18 or 26 neighbours that share a lattice cell.
-    Lattice(u8),
+    Lattice(#[schemars(extend("enum" = [6, 18, 26]))] u8),
     /// All particles within a radius, in multiples of the largest lattice spacing.
     Radius {
         /// Radius over spacing.
@@ -274,7 +290,7 @@ pub enum ReferenceUpdate {
     /// After every step: updated Lagrangian.
     EveryStep,
     /// After every n steps.
-    Every(u32),
+    Every(#[schemars(range(min = 1))] u32),
 }
 
 /// Which incremental deformation measures are independent unknowns.
@@ -316,6 +332,7 @@ pub enum Limiter {
 #[serde(deny_unknown_fields)]
 pub struct Time {
     /// End [s]; a run starts at 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub end: f64,
 }
 

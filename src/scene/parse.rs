@@ -1,12 +1,9 @@
 //! JSON text and overrides to a typed scene; every error names the place.
 
-use std::fmt;
-
-use serde::de::{self, Deserialize, Deserializer};
-use serde_json::{Map, Number, Value};
-use serde_path_to_error::Segment;
+use serde_json::{Map, Value};
 
 use super::Scene;
+use super::tree::{Node, Strict};
 use crate::error::{Code, Error, Result};
 
 /// Parses without checking the values.
@@ -20,15 +17,9 @@ pub(super) fn parse(text: &str, overrides: &[String]) -> Result<Scene> {
 
 fn syntax_error(text: &str, error: &serde_json::Error) -> Error {
     let line = text.lines().nth(error.line().saturating_sub(1));
-    let near = line.map_or("", |l| {
-        let start = error.column().saturating_sub(2).min(l.len());
-        l.get(start..).unwrap_or("")
-    });
-    let hint = if ["NaN", "Inf", "aN", "nf"]
-        .iter()
-        .any(|n| near.starts_with(n))
-    {
-        ": numbers are finite, JSON has no NaN and no Infinity"
+    let near = line.and_then(|l| l.get(error.column().saturating_sub(1)..));
+    let hint = if near.is_some_and(|n| n.starts_with("NaN") || n.starts_with("Inf")) {
+        ": JSON has no NaN and no Infinity, numbers are finite"
     } else {
         ""
     };
@@ -38,115 +29,52 @@ fn syntax_error(text: &str, error: &serde_json::Error) -> Error {
     )
 }
 
-/// A JSON tree without duplicate keys, which `serde_json::Value` would drop silently.
-struct Strict(Value);
-
-impl<'de> Deserialize<'de> for Strict {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        struct Visitor;
-        impl<'de> de::Visitor<'de> for Visitor {
-            type Value = Strict;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a JSON value")
-            }
-            fn visit_bool<E>(self, v: bool) -> std::result::Result<Strict, E> {
-                Ok(Strict(Value::Bool(v)))
-            }
-            fn visit_i64<E>(self, v: i64) -> std::result::Result<Strict, E> {
-                Ok(Strict(v.into()))
-            }
-            fn visit_u64<E>(self, v: u64) -> std::result::Result<Strict, E> {
-                Ok(Strict(v.into()))
-            }
-            fn visit_f64<E: de::Error>(self, v: f64) -> std::result::Result<Strict, E> {
-                match Number::from_f64(v) {
-                    Some(number) => Ok(Strict(Value::Number(number))),
-                    None => Err(E::custom("a number is not finite")),
-                }
-            }
-            fn visit_str<E>(self, v: &str) -> std::result::Result<Strict, E> {
-                Ok(Strict(v.into()))
-            }
-            fn visit_unit<E>(self) -> std::result::Result<Strict, E> {
-                Ok(Strict(Value::Null))
-            }
-            fn visit_seq<A: de::SeqAccess<'de>>(
-                self,
-                mut seq: A,
-            ) -> std::result::Result<Strict, A::Error> {
-                let mut items = Vec::new();
-                while let Some(Strict(item)) = seq.next_element()? {
-                    items.push(item);
-                }
-                Ok(Strict(Value::Array(items)))
-            }
-            fn visit_map<A: de::MapAccess<'de>>(
-                self,
-                mut map: A,
-            ) -> std::result::Result<Strict, A::Error> {
-                let mut object = Map::new();
-                while let Some(key) = map.next_key::<String>()? {
-                    if object.contains_key(&key) {
-                        return Err(de::Error::custom(format!("duplicate key `{key}`")));
-                    }
-                    let Strict(value) = map.next_value()?;
-                    object.insert(key, value);
-                }
-                Ok(Strict(Value::Object(object)))
-            }
-        }
-        deserializer.deserialize_any(Visitor)
-    }
-}
-
 /// Tree to types. The messages of serde are for programmers; the ones that leave here are not.
 fn typed(tree: &Value) -> Result<Scene> {
-    serde_path_to_error::deserialize(tree).map_err(|error| {
-        let mut message = error.inner().to_string();
-        for jargon in ["string or map", "map with a single key"] {
-            if let (true, Some(words)) = (message.contains(jargon), words(tree, error.path())) {
-                message = message.replace(jargon, &words);
-            }
-        }
-        for (jargon, plain) in [
-            ("expected f64", "expected a number"),
-            ("expected u8", "expected a whole number from 0 to 255"),
-            ("expected u32", "expected a whole number, 0 or more"),
-            ("expected a boolean", "expected true or false"),
-            ("expected a sequence", "expected a list"),
-            ("expected an array of length", "expected a list of length"),
-        ] {
-            message = message.replace(jargon, plain);
-        }
-        let error_of_shape = Error::new(Code::Parse, message);
+    serde_path_to_error::deserialize(Node(tree)).map_err(|error| {
+        let shape = Error::new(Code::Parse, plain(&error.inner().to_string()));
         match error.path().to_string() {
-            root if root == "." => error_of_shape,
-            path => error_of_shape.at_path(path),
+            root if root == "." => shape,
+            path => shape.at_path(path),
         }
     })
 }
 
-/// The words or keys that are allowed at a place: what the parser expects instead of a wrong word.
-fn words(tree: &Value, path: &serde_path_to_error::Path) -> Option<String> {
-    let mut probe = tree.clone();
-    let place = path
-        .iter()
-        .try_fold(&mut probe, |node, segment| match segment {
-            Segment::Seq { index } => node.get_mut(index),
-            Segment::Map { key } => node.get_mut(key),
-            Segment::Enum { variant } => node.get_mut(variant),
-            Segment::Unknown => None,
-        })?;
-    *place = Value::String(String::new());
-    let error = Scene::deserialize(&probe).err()?.to_string();
-    let (_, expected) = error.split_once("unknown variant ``, expected ")?;
-    Some(
-        if expected.contains("one of ") || expected.contains(" or ") {
-            expected.to_owned()
-        } else {
-            format!("one of {expected}")
-        },
-    )
+/// A message of serde in words of JSON. The replaced words stand at the beginning and behind
+/// "expected", so that nothing of the user's text is touched.
+fn plain(message: &str) -> String {
+    let (found, expected) = message.rsplit_once(", expected ").unwrap_or((message, ""));
+    let mut text = found.to_owned();
+    for (jargon, word) in [
+        ("unknown field", "unknown key"),
+        ("missing field", "missing key"),
+        ("unknown variant", "unknown word"),
+        ("invalid type: sequence", "invalid type: a list"),
+        ("invalid type: map", "invalid type: an object"),
+        ("invalid type: unit value", "invalid type: null"),
+        ("invalid type: unit variant", "this word needs a value"),
+    ] {
+        if let Some(rest) = found.strip_prefix(jargon) {
+            text = format!("{word}{rest}");
+        }
+    }
+    if expected.is_empty() {
+        return text;
+    }
+    let expected = match expected {
+        "f64" => "a number",
+        "u8" => "a whole number from 0 to 255",
+        "u32" => "a whole number, 0 or more",
+        "a boolean" => "true or false",
+        "a string" => "a text",
+        "a sequence" => "a list",
+        "a map" => "an object",
+        "unit" => "the word alone",
+        "newtype variant" => "an object with the word as its key",
+        "an array of length 3" | "3 elements in sequence" => "a list of 3",
+        other => other,
+    };
+    format!("{text}, expected {expected}")
 }
 
 /// Applies `path=value` to the tree.
@@ -270,21 +198,24 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// Names the override that an error may come from: one that set the place of the error, or
-/// something below it that the message names.
+/// Names the override that an error comes from: one that set the place of the error or what
+/// contains it, or one that set something below it and is named in the message.
 pub(super) fn with_override(error: Error, overrides: &[String]) -> Error {
     let place = error.place().path.clone().unwrap_or_default();
-    let below = |long: &str, short: &str| {
+    let at_or_below = |long: &str, short: &str| {
         long.strip_prefix(short)
             .is_some_and(|after| after.is_empty() || after.starts_with(['.', '[']))
     };
+    let mentioned = |name: &str| error.message().contains(&format!("`{name}`"));
     let culprit = overrides.iter().rev().find(|text| {
         let path = text.split('=').next().unwrap_or_default().trim();
-        below(&place, path)
-            || (place.is_empty() || below(path, &place))
-                && path[place.len()..]
-                    .split(['.', '[', ']', '"'])
-                    .any(|name| !name.is_empty() && error.message().contains(&format!("`{name}`")))
+        let path = path.replace("[\"", ".").replace("\"]", "");
+        let from_the_places_name = place.rfind('.').map_or(0, |dot| dot + 1);
+        at_or_below(&place, &path)
+            || (place.is_empty() || at_or_below(&path, &place))
+                && path[from_the_places_name..]
+                    .split(['.', '[', ']'])
+                    .any(|name| !name.is_empty() && mentioned(name))
     });
     match culprit {
         Some(text) => error.with_note(&format!("see the override `{text}`")),

@@ -50,7 +50,7 @@ impl Scene {
             require(
                 !faces.contains(name),
                 &path,
-                "this is the name of a face already; choose another",
+                &format!("`{name}` is the name of a face already; choose another"),
             )?;
             selection(&path, patch, &faces)?;
         }
@@ -60,7 +60,7 @@ impl Scene {
                 let known = self.patches.keys().chain(&faces);
                 return Err(Error::scene(
                     path,
-                    format!("there is no such patch; there are {}", listed(known)),
+                    format!("there is no patch `{name}`; there are {}", listed(known)),
                 ));
             }
             conditions(&path, condition).map_err(|e| e.at_boundary(name))?;
@@ -321,11 +321,15 @@ fn initial(initial: &Initial) -> Result<()> {
                 in_space,
             )?;
         }
-        require(
-            !function.depends_on_time(),
-            &path,
-            "an initial value cannot depend on t",
-        )?;
+        if let VectorFunction::Components(functions) = &function {
+            for (c, component) in functions.iter().flatten().enumerate() {
+                require(
+                    !component.depends_on_time(),
+                    &format!("{path}[{c}]"),
+                    "an initial value cannot depend on t",
+                )?;
+            }
+        }
     }
     Ok(())
 }
@@ -451,23 +455,28 @@ fn capacity(geometry: &Geometry, memory: Option<f64>) -> Result<()> {
             most = (count, name);
         }
     }
-    let gigabytes = total * BYTES_PER_PARTICLE / 1e9;
+    let amount = |x: f64, unit: f64, digits: usize| match x / unit {
+        small if small < 1e12 => format!("{small:.digits$}"),
+        large => format!("{large:.1e}"),
+    };
     let error = |limit: String| {
         let place = box_path(most.1);
         Err(Error::new(
             Code::OutOfMemory,
             format!(
-                "this spacing makes about {total:.4e} particles, which need about {gigabytes:.4} GB; {limit}; choose a larger spacing"
+                "this spacing makes about {} particles, which need about {} GB; {limit}; choose a larger spacing",
+                amount(total, 1.0, 0),
+                amount(total * BYTES_PER_PARTICLE, 1e9, 1)
             ),
         )
         .at_path(format!("{place}.spacing")))
     };
-    if !(total <= MAX_PARTICLES) {
+    if total > MAX_PARTICLES {
         return error(format!("at most {MAX_PARTICLES} particles are possible"));
     }
     match memory {
         Some(bytes) if total * BYTES_PER_PARTICLE > bytes => {
-            error(format!("{:.4} GB are available", bytes / 1e9))
+            error(format!("{} GB are available", amount(bytes, 1e9, 1)))
         }
         _ => Ok(()),
     }
@@ -479,4 +488,31 @@ fn available_memory() -> Option<f64> {
     let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
     let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kib * 1024.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_particles_than_memory_are_refused() {
+        let geometry = Geometry::Box(BoxGeometry {
+            min: [0.0; 3],
+            max: [1.0; 3],
+            spacing: Spacing::Uniform(0.1),
+        });
+        let need = 1331.0 * BYTES_PER_PARTICLE;
+        capacity(&geometry, None).unwrap();
+        capacity(&geometry, Some(need)).unwrap();
+        let error = capacity(&geometry, Some(need - 1.0)).unwrap_err();
+        assert_eq!(error.code(), Code::OutOfMemory);
+        assert_eq!(error.place().path.as_deref(), Some("geometry.box.spacing"));
+        assert!(error.message().contains("1331 particles"), "{error}");
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_available_memory_is_known() {
+        assert!(available_memory().unwrap() > 1e6);
+    }
 }

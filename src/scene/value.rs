@@ -13,7 +13,7 @@ use crate::error::{Code, Error, Result};
 
 /// A scalar in space and time.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, deny_unknown_fields)]
 pub enum Scalar {
     /// Constant.
     Constant(f64),
@@ -36,7 +36,7 @@ pub enum Scalar {
 
 /// A vector in space and time.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, deny_unknown_fields)]
 pub enum Vector {
     /// By components; `null` only where a component may stay free.
     Components([Option<Scalar>; 3]),
@@ -179,7 +179,8 @@ impl<'de> Deserialize<'de> for Vector {
     }
 }
 
-/// A [`Scalar`] compiled for evaluation: no look-up, no allocation, any number of threads.
+/// A [`Scalar`] compiled for evaluation by any number of threads: no look-up by name, and no
+/// allocation for an expression of up to 32 operands.
 #[derive(Debug, Clone)]
 pub enum ScalarFunction {
     /// Constant.

@@ -1,0 +1,171 @@
+//! Structure-of-arrays storage of per-particle fields.
+//!
+//! A component is contiguous; particles sit in slots, eight to a slice. One guard slice before and
+//! one after the particles, and the unused lanes of the last slice, hold finite dummies, so that a
+//! slice can be read at any offset and a pair weight of 0 makes the dummies harmless.
+
+use crate::lane::{F64x8, WIDTH};
+
+/// Shape shared by all arrays of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Particles.
+    pub particles: usize,
+    /// Slices that hold them.
+    pub slices: usize,
+    /// Slices per slab: the unit of parallel work and of partial sums.
+    pub slab: usize,
+}
+
+impl Layout {
+    /// Layout for a number of particles. The slab is a function of that number alone: small enough
+    /// to feed many threads, large enough to make its bookkeeping negligible.
+    pub fn new(particles: usize) -> Self {
+        let slices = particles.div_ceil(WIDTH).max(1);
+        Self { particles, slices, slab: (slices / 256).clamp(8, 256) }
+    }
+    /// First slot: the guard slice comes before.
+    pub const FIRST: usize = WIDTH;
+    /// Slot of a particle in the body's order.
+    pub fn slot(particle: usize) -> usize {
+        particle + Self::FIRST
+    }
+    /// Number of slabs.
+    pub fn slabs(&self) -> usize {
+        self.slices.div_ceil(self.slab)
+    }
+    /// First slot and number of slices of a slab.
+    pub fn slab_range(&self, index: usize) -> (usize, usize) {
+        let first = index * self.slab;
+        (Self::FIRST + first * WIDTH, self.slab.min(self.slices - first))
+    }
+    /// Slices from one component to the next. A distance that is a multiple of 4 kB would map all
+    /// components of a particle to the same cache set.
+    fn stride(&self) -> usize {
+        let stride = self.slices + 2;
+        if stride % 64 == 0 { stride + 1 } else { stride }
+    }
+}
+
+/// `N` components per particle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array<const N: usize> {
+    data: Vec<F64x8>,
+    layout: Layout,
+}
+
+impl<const N: usize> Array<N> {
+    /// All slots, guards included, hold `value`.
+    pub fn new(layout: Layout, value: [f64; N]) -> Self {
+        let stride = layout.stride();
+        let mut data = Vec::with_capacity(N * stride);
+        for v in value {
+            data.resize(data.len() + stride, F64x8([v; WIDTH]));
+        }
+        Self { data, layout }
+    }
+    /// An array without particles, to stand in for one that is taken out for a while.
+    pub fn empty() -> Self {
+        Self { data: Vec::new(), layout: Layout { particles: 0, slices: 0, slab: 1 } }
+    }
+    /// The components, each with its guard slices: index them with a slot.
+    #[inline(always)]
+    pub fn components(&self) -> [&[f64]; N] {
+        let stride = self.layout.stride() * WIDTH;
+        let all: &[f64] = self.flat();
+        std::array::from_fn(|c| &all[c * stride..(c + 1) * stride])
+    }
+    /// All numbers; component `c` of slot `s` is `flat()[c * component_stride() + s]`.
+    pub fn flat(&self) -> &[f64] {
+        bytemuck::must_cast_slice(&self.data)
+    }
+    /// See [`flat`](Self::flat).
+    pub fn flat_mut(&mut self) -> &mut [f64] {
+        bytemuck::must_cast_slice_mut(&mut self.data)
+    }
+    /// Shape.
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+    /// Number of particles.
+    pub fn particles(&self) -> usize {
+        self.layout.particles
+    }
+    /// Distance between components, in numbers.
+    pub fn component_stride(&self) -> usize {
+        self.layout.stride() * WIDTH
+    }
+    /// Value of a slot.
+    #[inline]
+    pub fn get(&self, slot: usize) -> [f64; N] {
+        let (all, stride) = (self.flat(), self.component_stride());
+        std::array::from_fn(|c| all[c * stride + slot])
+    }
+    /// Sets a slot.
+    #[inline]
+    pub fn set(&mut self, slot: usize, value: [f64; N]) {
+        let stride = self.component_stride();
+        let all = self.flat_mut();
+        for (c, v) in value.into_iter().enumerate() {
+            all[c * stride + slot] = v;
+        }
+    }
+    /// One piece per slab, by components, without the guards: slot `FIRST + i` of slab 0 is index `i`.
+    pub fn slabs_mut(&mut self) -> Vec<[&mut [f64]; N]> {
+        let Layout { slices, slab, .. } = self.layout;
+        let stride = self.layout.stride();
+        let mut pieces: [_; N] = {
+            let mut components = self.data.chunks_exact_mut(stride);
+            std::array::from_fn(|_| {
+                let component = components.next().expect("N components");
+                component[1..=slices].chunks_mut(slab)
+            })
+        };
+        (0..self.layout.slabs())
+            .map(|_| {
+                std::array::from_fn(|c| {
+                    bytemuck::must_cast_slice_mut(pieces[c].next().expect("as many pieces as slabs"))
+                })
+            })
+            .collect()
+    }
+    /// Copies the particles' values from an array of the same layout.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.data.copy_from_slice(&other.data);
+    }
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        std::mem::size_of_val(&self.data[..])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slabs_cover_every_particle_once_and_leave_the_guards() {
+        for particles in [1, 7, 8, 9, 64, 1000, 20_000] {
+            let layout = Layout::new(particles);
+            let mut array = Array::<3>::new(layout, [-1.0; 3]);
+            for (s, piece) in array.slabs_mut().into_iter().enumerate() {
+                let (first, slices) = layout.slab_range(s);
+                for (c, values) in piece.into_iter().enumerate() {
+                    assert_eq!(values.len(), slices * WIDTH);
+                    for (i, v) in values.iter_mut().enumerate() {
+                        assert_eq!(*v, -1.0);
+                        *v = (1000 * (first + i) + c) as f64;
+                    }
+                }
+            }
+            for i in 0..particles {
+                let slot = Layout::slot(i);
+                assert_eq!(array.get(slot), [0, 1, 2].map(|c| (1000 * slot + c) as f64));
+            }
+            for c in array.components() {
+                assert!(c[..WIDTH].iter().all(|v| *v == -1.0));
+                assert!(c[WIDTH * (layout.slices + 1)..].iter().all(|v| *v == -1.0));
+            }
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Constitutive laws at one point, as small `Copy` values written once over a lane.
+
+mod mooney_rivlin;
+mod neo_hookean;
+
+pub use mooney_rivlin::MooneyRivlin;
+pub use neo_hookean::NeoHookean;
+
+use crate::lane::Lane;
+use crate::math::{Mat3, mat_mul_t, scale9};
+
+
+/// A hyperelastic law W(F, H, J).
+pub trait Material: Copy + Send + Sync {
+    /// Density rho_R [kg/m^3], initial.
+    fn density(&self) -> f64;
+    /// Speed of pressure waves of the linearised law [m/s], sqrt((lambda + 2 mu)/rho_R).
+    fn pressure_wave_speed(&self) -> f64;
+    /// Speed of shear waves of the linearised law [m/s], sqrt(mu/rho_R).
+    fn shear_wave_speed(&self) -> f64;
+    /// First Piola-Kirchhoff stress, its volumetric conjugate, and the energy.
+    fn stress<T: Lane>(&self, f: &Mat3<T>, h: &Mat3<T>, j: T) -> Stress<T>;
+}
+
+/// Total deformation of one point: initial to current.
+#[derive(Clone, Copy, Debug)]
+pub struct Deformation<T> {
+    /// F = f F_chi.
+    pub f: Mat3<T>,
+    /// H = h H_chi.
+    pub h: Mat3<T>,
+    /// J = j J_chi.
+    pub j: T,
+}
+
+/// What a law gives at one point.
+#[derive(Clone, Copy)]
+pub struct Stress<T> {
+    /// P = Sigma_F + Sigma_H x F + Sigma_J H [Pa] ([URL22] 6).
+    pub p: Mat3<T>,
+    /// Sigma_J = dW/dJ [Pa].
+    pub sigma_j: T,
+    /// W [J/m^3], per unit initial volume.
+    pub energy: T,
+}
+
+/// Elastic constants of the linearised law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moduli {
+    /// Shear modulus mu [Pa].
+    pub mu: f64,
+    /// Bulk modulus kappa [Pa].
+    pub kappa: f64,
+    /// Density rho_R [kg/m^3].
+    pub rho: f64,
+}
+
+impl Moduli {
+    /// From Young's modulus [Pa] and Poisson's ratio.
+    pub fn new(youngs_modulus: f64, poisson_ratio: f64, rho: f64) -> Self {
+        Self {
+            mu: youngs_modulus / (2.0 * (1.0 + poisson_ratio)),
+            kappa: youngs_modulus / (3.0 * (1.0 - 2.0 * poisson_ratio)),
+            rho,
+        }
+    }
+    fn pressure_wave_speed(&self) -> f64 {
+        ((self.kappa + 4.0 / 3.0 * self.mu) / self.rho).sqrt()
+    }
+    fn shear_wave_speed(&self) -> f64 {
+        (self.mu / self.rho).sqrt()
+    }
+}
+
+/// The laws that a scene can name. Matched once per body and stage, outside the particle loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// Neo-Hookean.
+    NeoHookean(NeoHookean),
+    /// Mooney-Rivlin.
+    MooneyRivlin(MooneyRivlin),
+}
+
+/// Runs an expression with the scene's law bound to a name.
+macro_rules! with_law {
+    ($law:expr, $name:ident => $body:expr) => {
+        match $law {
+            $crate::material::Law::NeoHookean($name) => $body,
+            $crate::material::Law::MooneyRivlin($name) => $body,
+        }
+    };
+}
+pub(crate) use with_law;
+
+impl Law {
+    /// The law of a scene.
+    pub fn new(material: &crate::scene::Material) -> Self {
+        use crate::scene::Material as M;
+        match material {
+            M::NeoHookean(m) => Law::NeoHookean(NeoHookean(Moduli::new(
+                m.youngs_modulus,
+                m.poisson_ratio,
+                m.density,
+            ))),
+            M::MooneyRivlin(m) => Law::MooneyRivlin(MooneyRivlin::new(
+                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density),
+                m.area_share,
+            )),
+        }
+    }
+    /// Density rho_R [kg/m^3].
+    pub fn density(&self) -> f64 {
+        with_law!(*self, law => law.density())
+    }
+    /// Stresses and energy at one point.
+    pub fn at(&self, d: &Deformation<f64>) -> Point {
+        let stress = with_law!(*self, law => law.stress(&d.f, &d.h, d.j));
+        Point {
+            first_piola: stress.p,
+            cauchy: scale9(1.0 / d.j, &mat_mul_t(&stress.p, &d.f)),
+            energy: stress.energy,
+        }
+    }
+}
+
+/// Stresses and energy of one point, for output.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// P [Pa].
+    pub first_piola: Mat3<f64>,
+    /// sigma = P F^T / J [Pa].
+    pub cauchy: Mat3<f64>,
+    /// W [J/m^3].
+    pub energy: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::*;
+
+    /// P = dW/dF, zero stress and the linear moduli at rest, objectivity.
+    fn check(law: impl Material, moduli: Moduli) {
+        let all = |f: &Mat3<f64>| {
+            let h = cofactor(f);
+            law.stress(f, &h, dot(f[0], h[0]))
+        };
+        let rest = all(&identity());
+        assert!(double_dot(&rest.p, &rest.p).sqrt() < 1e-9 * moduli.mu);
+        assert!(rest.energy.abs() < 1e-9 * moduli.mu);
+        let f = [[1.2, 0.3, -0.1], [0.05, 0.8, 0.2], [-0.2, 0.1, 1.1]];
+        let stress = all(&f);
+        let mut worst: f64 = 0.0;
+        for r in 0..3 {
+            for c in 0..3 {
+                let energy = |e: f64| {
+                    let mut g = f;
+                    g[r][c] += e;
+                    all(&g).energy
+                };
+                let slope = (energy(1e-6) - energy(-1e-6)) / 2e-6;
+                worst = worst.max((slope - stress.p[r][c]).abs() / moduli.mu);
+            }
+        }
+        println!("P - dW/dF over mu: {worst:e} (tolerance 1e-7)");
+        assert!(worst < 1e-7);
+        let e = 1e-6;
+        let shear = all(&[[1.0, e, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).p[0][1] / e;
+        assert!((shear / moduli.mu - 1.0).abs() < 1e-5);
+        let volume = all(&[[1.0 + e, 0.0, 0.0], [0.0, 1.0 + e, 0.0], [0.0, 0.0, 1.0 + e]]);
+        let pressure = (volume.p[0][0] + volume.p[1][1] + volume.p[2][2]) / 3.0;
+        assert!((pressure / (3.0 * e) / moduli.kappa - 1.0).abs() < 1e-4);
+        let turn = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
+        let turned = all(&mat_mul(&turn, &f));
+        let expected = mat_mul(&turn, &stress.p);
+        for r in 0..3 {
+            for c in 0..3 {
+                assert!((turned.p[r][c] - expected[r][c]).abs() < 1e-12 * moduli.kappa);
+            }
+        }
+    }
+
+    #[test]
+    fn laws_are_consistent() {
+        let moduli = Moduli::new(1.7e7, 0.3, 1100.0);
+        check(NeoHookean(moduli), moduli);
+        for share in [0.0, 0.5, 1.0] {
+            check(MooneyRivlin::new(moduli, share), moduli);
+        }
+    }
+}

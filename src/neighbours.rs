@@ -1,0 +1,147 @@
+//! Neighbour lists: positions in, a symmetric graph out. Nothing else is touched.
+
+use std::collections::HashMap;
+
+use crate::error::{Error, Result};
+use crate::parallel;
+use crate::particles::{Lattice, Particles};
+use crate::scene::Neighbours;
+
+/// Neighbours of every particle, ascending, without the particle itself; body's order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Graph {
+    start: Vec<usize>,
+    to: Vec<u32>,
+}
+
+impl Graph {
+    /// The graph of a scene's particles.
+    ///
+    /// # Errors
+    /// [`Code::InvalidScene`](crate::Code::InvalidScene) naming an isolated particle or a part of
+    /// the body that hangs on nothing.
+    pub fn new(particles: &Particles, neighbours: Neighbours) -> Result<Self> {
+        let lists = match neighbours {
+            Neighbours::Lattice(number) => lattice_lists(&particles.lattice, particles.count(), number),
+            Neighbours::Radius { radius } => {
+                radius_lists(&particles.positions, radius * particles.lattice.largest_spacing())
+            }
+        };
+        let graph = Self::from_lists(lists);
+        graph.check_connected(particles)?;
+        Ok(graph)
+    }
+
+    fn from_lists(lists: Vec<Vec<u32>>) -> Self {
+        let mut start = Vec::with_capacity(lists.len() + 1);
+        let mut to = Vec::with_capacity(lists.iter().map(Vec::len).sum());
+        start.push(0);
+        for list in lists {
+            to.extend_from_slice(&list);
+            start.push(to.len());
+        }
+        Self { start, to }
+    }
+
+    /// Neighbours of a particle.
+    pub fn of(&self, particle: usize) -> &[u32] {
+        &self.to[self.start[particle]..self.start[particle + 1]]
+    }
+
+    /// Particles.
+    pub fn count(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// Directed pairs.
+    pub fn pairs(&self) -> usize {
+        self.to.len()
+    }
+
+    fn check_connected(&self, particles: &Particles) -> Result<()> {
+        let place = |i: usize| (particles.caller(i), Some(particles.positions[i]));
+        if let Some(i) = (0..self.count()).find(|i| self.of(*i).is_empty()) {
+            let (particle, position) = place(i);
+            return Err(Error::scene(
+                "numerics.neighbours",
+                "a particle has no neighbours: widen the radius or refine the spacing",
+            )
+            .at_particle(particle, position));
+        }
+        let mut seen = vec![false; self.count()];
+        let mut stack = vec![0usize];
+        seen[0] = true;
+        while let Some(i) = stack.pop() {
+            for &b in self.of(i) {
+                if !std::mem::replace(&mut seen[b as usize], true) {
+                    stack.push(b as usize);
+                }
+            }
+        }
+        if let Some(i) = seen.iter().position(|s| !s) {
+            let (particle, position) = place(i);
+            return Err(Error::scene(
+                "geometry",
+                "the body falls into parts that are not connected: let the boxes share a face, \
+                 or make a scene of each part",
+            )
+            .at_particle(particle, position));
+        }
+        Ok(())
+    }
+}
+
+fn lattice_lists(lattice: &Lattice, count: usize, number: u8) -> Vec<Vec<u32>> {
+    let reach = match number {
+        6 => 1,
+        18 => 2,
+        _ => 3,
+    };
+    let mut offsets = Vec::new();
+    for z in -1..=1i32 {
+        for y in -1..=1i32 {
+            for x in -1..=1i32 {
+                let away = x.abs() + y.abs() + z.abs();
+                if away > 0 && away <= reach {
+                    offsets.push([x, y, z]);
+                }
+            }
+        }
+    }
+    parallel::fill(count, |i| {
+        let mut list: Vec<u32> = offsets.iter().filter_map(|o| lattice.neighbour(i, *o)).collect();
+        list.sort_unstable();
+        list
+    })
+}
+
+/// Cell list with cells as wide as the radius.
+fn radius_lists(positions: &[[f64; 3]], radius: f64) -> Vec<Vec<u32>> {
+    // Round-off in the coordinates must not make a list asymmetric or drop a lattice shell.
+    let radius = radius * (1.0 + 1e-9);
+    let cell = |x: &[f64; 3]| x.map(|v| (v / radius).floor() as i64);
+    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    for (i, x) in positions.iter().enumerate() {
+        cells.entry(cell(x)).or_default().push(i as u32);
+    }
+    let reach = radius * radius;
+    parallel::fill(positions.len(), |i| {
+        let (x, centre) = (positions[i], cell(&positions[i]));
+        let mut list = Vec::new();
+        for dz in -1..=1 {
+            for dy in -1..=1 {
+                for dx in -1..=1 {
+                    let key = [centre[0] + dx, centre[1] + dy, centre[2] + dz];
+                    for &b in cells.get(&key).into_iter().flatten() {
+                        let d: f64 = (0..3).map(|a| (positions[b as usize][a] - x[a]).powi(2)).sum();
+                        if b as usize != i && d <= reach {
+                            list.push(b);
+                        }
+                    }
+                }
+            }
+        }
+        list.sort_unstable();
+        list
+    })
+}

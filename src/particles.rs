@@ -1,0 +1,438 @@
+//! Scene to points: positions, tributary volumes, and boundary patches with areas and normals.
+//!
+//! A union of boxes becomes one rectilinear lattice: the bounds of all boxes cut each axis into
+//! segments, each divided evenly by the finest spacing that a box asks for there. Nodes of filled
+//! cells are particles; a particle's tributary volume and areas are an eighth of its cells and a
+//! quarter of its boundary faces.
+
+use std::collections::BTreeMap;
+
+use crate::error::{Code, Error, Result};
+use crate::scene::{BoxGeometry, Geometry, PatchSelection, Scene, Spacing};
+
+/// The points of a body, in the body's order: lexicographic, shortest lattice axis first, which
+/// keeps neighbours close in memory.
+#[derive(Debug, Clone)]
+pub struct Particles {
+    /// X [m], initial.
+    pub positions: Vec<[f64; 3]>,
+    /// V_R [m^3], initial.
+    pub volumes: Vec<f64>,
+    /// Body's particle to caller's particle (lexicographic, X first, then Y, then Z).
+    pub order: Vec<u32>,
+    /// Caller's particle to body's particle.
+    pub rank: Vec<u32>,
+    /// The lattice behind the points.
+    pub lattice: Lattice,
+    /// Named patches: all faces of the geometry, then the scene's own.
+    pub patches: Vec<PatchFacets>,
+}
+
+/// A named part of the surface.
+#[derive(Debug, Clone)]
+pub struct PatchFacets {
+    /// Name.
+    pub name: String,
+    /// Outward normal and tributary area [m^2] by body's particle; several where normals differ.
+    pub facets: Vec<Facet>,
+}
+
+/// Share of one particle in a plane piece of the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Facet {
+    /// Body's particle.
+    pub particle: u32,
+    /// Unit outward normal N, initial.
+    pub normal: [f64; 3],
+    /// A_R [m^2], initial.
+    pub area: f64,
+}
+
+/// A rectilinear lattice with filled cells.
+#[derive(Debug, Clone)]
+pub struct Lattice {
+    /// Node coordinates per axis [m].
+    lines: [Vec<f64>; 3],
+    /// Whether a cell is filled, X first.
+    filled: Vec<bool>,
+    /// Body's particle of a node (X first), `NONE` where there is none.
+    node: Vec<u32>,
+    /// Node of a body's particle.
+    sites: Vec<[u32; 3]>,
+}
+
+const NONE: u32 = u32::MAX;
+const AXES: [char; 3] = ['x', 'y', 'z'];
+
+impl Lattice {
+    fn cells(&self, axis: usize) -> usize {
+        self.lines[axis].len() - 1
+    }
+    fn cell_index(&self, c: [usize; 3]) -> usize {
+        (c[2] * self.cells(1) + c[1]) * self.cells(0) + c[0]
+    }
+    fn node_index(&self, n: [usize; 3]) -> usize {
+        (n[2] * self.lines[1].len() + n[1]) * self.lines[0].len() + n[0]
+    }
+    /// Whether a cell exists and is filled.
+    fn is_filled(&self, c: [isize; 3]) -> bool {
+        (0..3).all(|a| c[a] >= 0 && (c[a] as usize) < self.cells(a))
+            && self.filled[self.cell_index(c.map(|v| v as usize))]
+    }
+    /// Largest lattice spacing [m].
+    pub fn largest_spacing(&self) -> f64 {
+        self.lines
+            .iter()
+            .flat_map(|l| l.windows(2).map(|w| w[1] - w[0]))
+            .fold(0.0, f64::max)
+    }
+    /// The particle at an offset of -1, 0, 1 per axis, if both share a filled cell.
+    pub fn neighbour(&self, particle: usize, offset: [i32; 3]) -> Option<u32> {
+        let site = self.sites[particle].map(|s| s as isize);
+        let shared = |corner: usize| {
+            // The cells that hold both nodes: fixed along axes with an offset, two choices along others.
+            let cell = std::array::from_fn(|a| match offset[a] {
+                1 => site[a],
+                -1 => site[a] - 1,
+                _ => site[a] - (corner >> a & 1) as isize,
+            });
+            self.is_filled(cell)
+        };
+        if !(0..8).any(shared) {
+            return None;
+        }
+        let n = std::array::from_fn(|a| (site[a] + offset[a] as isize) as usize);
+        Some(self.node[self.node_index(n)])
+    }
+    /// Trilinear interpolation at a point: up to eight (particle, weight). `None` outside the body.
+    pub fn interpolation(&self, point: [f64; 3]) -> Option<Vec<(u32, f64)>> {
+        let mut choices: [Vec<(usize, f64)>; 3] = Default::default();
+        for a in 0..3 {
+            let lines = &self.lines[a];
+            let extent = lines[lines.len() - 1] - lines[0];
+            for c in 0..self.cells(a) {
+                let width = lines[c + 1] - lines[c];
+                let s = (point[a] - lines[c]) / width;
+                let slack = 1e-9 * extent / width;
+                if s >= -slack && s <= 1.0 + slack {
+                    // Snapped: a probe on a node reads that node and nothing else.
+                    let s = if s.abs() <= slack { 0.0 } else { s };
+                    let s = if (s - 1.0).abs() <= slack { 1.0 } else { s };
+                    choices[a].push((c, s));
+                }
+            }
+        }
+        for &(k, sz) in &choices[2] {
+            for &(j, sy) in &choices[1] {
+                for &(i, sx) in &choices[0] {
+                    if !self.filled[self.cell_index([i, j, k])] {
+                        continue;
+                    }
+                    let mut weights = Vec::new();
+                    for corner in 0..8 {
+                        let bit = [corner & 1, corner >> 1 & 1, corner >> 2 & 1];
+                        let weight: f64 = [sx, sy, sz]
+                            .iter()
+                            .zip(bit)
+                            .map(|(s, b)| if b == 1 { *s } else { 1.0 - s })
+                            .product();
+                        if weight != 0.0 {
+                            let n = self.node_index([i + bit[0], j + bit[1], k + bit[2]]);
+                            weights.push((self.node[n], weight));
+                        }
+                    }
+                    return Some(weights);
+                }
+            }
+        }
+        None
+    }
+}
+
+/// Divides the axis between the bounds of all boxes.
+fn lattice_lines(boxes: &[(String, &BoxGeometry)], axis: usize) -> Vec<f64> {
+    let mut bounds: Vec<f64> = boxes.iter().flat_map(|(_, b)| [b.min[axis], b.max[axis]]).collect();
+    bounds.sort_by(f64::total_cmp);
+    let slack = 1e-9 * (bounds[bounds.len() - 1] - bounds[0]);
+    bounds.dedup_by(|a, b| *a - *b <= slack);
+    let mut lines = vec![bounds[0]];
+    for pair in bounds.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let middle = 0.5 * (from + to);
+        let cells = boxes
+            .iter()
+            .filter(|(_, b)| b.min[axis] < middle && middle < b.max[axis])
+            .map(|(_, b)| ((to - from) / spacing(b)[axis]).round().max(1.0) as usize)
+            .max()
+            .unwrap_or(1);
+        for i in 1..=cells {
+            let s = i as f64 / cells as f64;
+            lines.push(if i == cells { to } else { from + s * (to - from) });
+        }
+    }
+    lines
+}
+
+fn spacing(b: &BoxGeometry) -> [f64; 3] {
+    match b.spacing {
+        Spacing::Uniform(s) => [s; 3],
+        Spacing::PerAxis(s) => s,
+    }
+}
+
+/// The boxes of a geometry with the prefix of their face names.
+fn named_boxes(geometry: &Geometry) -> Vec<(String, &BoxGeometry)> {
+    match geometry {
+        Geometry::Box(b) => vec![(String::new(), b)],
+        Geometry::Boxes(boxes) => boxes.iter().map(|(n, b)| (format!("{n}."), b)).collect(),
+    }
+}
+
+/// A face of a filled cell that no other filled cell shares.
+struct BoundaryFace {
+    name: String,
+    axis: usize,
+    sign: f64,
+    area: f64,
+    centre: [f64; 3],
+    corners: [u32; 4],
+}
+
+impl Particles {
+    /// The points of a scene.
+    ///
+    /// # Errors
+    /// [`Code::InvalidScene`] naming the patch that selects no particle, [`Code::OutOfMemory`].
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let boxes = named_boxes(&scene.geometry);
+        let lines: [Vec<f64>; 3] = std::array::from_fn(|a| lattice_lines(&boxes, a));
+        let nodes = lines.iter().map(|l| l.len() as f64).product::<f64>();
+        if nodes >= f64::from(i32::MAX) {
+            return Err(Error::new(
+                Code::OutOfMemory,
+                format!("the lattice has {nodes:.3e} nodes, at most 2.1e9 are possible: choose a larger spacing"),
+            )
+            .at_path("geometry"));
+        }
+        let mut lattice = Lattice { lines, filled: Vec::new(), node: Vec::new(), sites: Vec::new() };
+        let cells = [0, 1, 2].map(|a| lattice.cells(a));
+        let mut owner = vec![NONE; cells.iter().product()];
+        for (number, (_, b)) in boxes.iter().enumerate() {
+            let range = |a: usize| {
+                let l = &lattice.lines[a];
+                let inside = |c: &usize| {
+                    let middle = 0.5 * (l[*c] + l[c + 1]);
+                    b.min[a] < middle && middle < b.max[a]
+                };
+                (0..cells[a]).filter(inside).collect::<Vec<_>>()
+            };
+            let (xs, ys, zs) = (range(0), range(1), range(2));
+            for &k in &zs {
+                for &j in &ys {
+                    for &i in &xs {
+                        let cell = &mut owner[lattice.cell_index([i, j, k])];
+                        if *cell == NONE {
+                            *cell = number as u32;
+                        }
+                    }
+                }
+            }
+        }
+        lattice.filled = owner.iter().map(|o| *o != NONE).collect();
+
+        let volumes_by_node = tributary_volumes(&lattice);
+        // Caller's order: node order, X first. Body's order: the axis with the fewest nodes first.
+        let sizes = [0, 1, 2].map(|a| lattice.lines[a].len());
+        let mut axes = [0, 1, 2];
+        axes.sort_by_key(|&a| sizes[a]);
+        lattice.node = vec![NONE; volumes_by_node.len()];
+        let mut callers = 0u32;
+        let mut caller_of_node = vec![NONE; volumes_by_node.len()];
+        for (n, v) in volumes_by_node.iter().enumerate() {
+            if *v > 0.0 {
+                caller_of_node[n] = callers;
+                callers += 1;
+            }
+        }
+        let count = callers as usize;
+        let mut this = Self {
+            positions: Vec::with_capacity(count),
+            volumes: Vec::with_capacity(count),
+            order: Vec::with_capacity(count),
+            rank: vec![0; count],
+            lattice,
+            patches: Vec::new(),
+        };
+        for k in 0..sizes[axes[2]] {
+            for j in 0..sizes[axes[1]] {
+                for i in 0..sizes[axes[0]] {
+                    let mut site = [0; 3];
+                    site[axes[0]] = i;
+                    site[axes[1]] = j;
+                    site[axes[2]] = k;
+                    let n = this.lattice.node_index(site);
+                    if caller_of_node[n] == NONE {
+                        continue;
+                    }
+                    let body = this.positions.len() as u32;
+                    this.lattice.node[n] = body;
+                    this.lattice.sites.push(site.map(|s| s as u32));
+                    this.positions.push(std::array::from_fn(|a| this.lattice.lines[a][site[a]]));
+                    this.volumes.push(volumes_by_node[n]);
+                    this.order.push(caller_of_node[n]);
+                    this.rank[caller_of_node[n] as usize] = body;
+                }
+            }
+        }
+        let faces = boundary_faces(&this.lattice, &owner, &boxes);
+        this.patches = patches(&faces, &scene.patches)?;
+        Ok(this)
+    }
+
+    /// Number of particles.
+    pub fn count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Caller's number of a body's particle.
+    pub fn caller(&self, body: usize) -> usize {
+        self.order[body] as usize
+    }
+}
+
+fn tributary_volumes(lattice: &Lattice) -> Vec<f64> {
+    let mut volumes = vec![0.0; lattice.lines.iter().map(Vec::len).product()];
+    for k in 0..lattice.cells(2) {
+        for j in 0..lattice.cells(1) {
+            for i in 0..lattice.cells(0) {
+                let cell = [i, j, k];
+                if !lattice.filled[lattice.cell_index(cell)] {
+                    continue;
+                }
+                let eighth: f64 = (0..3)
+                    .map(|a| 0.5 * (lattice.lines[a][cell[a] + 1] - lattice.lines[a][cell[a]]))
+                    .product();
+                for corner in 0..8 {
+                    let n = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
+                    volumes[lattice.node_index(n)] += eighth;
+                }
+            }
+        }
+    }
+    volumes
+}
+
+fn boundary_faces(
+    lattice: &Lattice,
+    owner: &[u32],
+    boxes: &[(String, &BoxGeometry)],
+) -> Vec<BoundaryFace> {
+    let mut faces = Vec::new();
+    for k in 0..lattice.cells(2) {
+        for j in 0..lattice.cells(1) {
+            for i in 0..lattice.cells(0) {
+                let cell = [i, j, k];
+                let number = owner[lattice.cell_index(cell)];
+                if number == NONE {
+                    continue;
+                }
+                for axis in 0..3 {
+                    for side in 0..2 {
+                        let mut beyond = cell.map(|c| c as isize);
+                        beyond[axis] += 2 * side as isize - 1;
+                        if lattice.is_filled(beyond) {
+                            continue;
+                        }
+                        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                        let width = |a: usize| lattice.lines[a][cell[a] + 1] - lattice.lines[a][cell[a]];
+                        let mut centre: [f64; 3] = std::array::from_fn(|a| {
+                            0.5 * (lattice.lines[a][cell[a] + 1] + lattice.lines[a][cell[a]])
+                        });
+                        centre[axis] = lattice.lines[axis][cell[axis] + side];
+                        let corners = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[du, dv]| {
+                            let mut n = cell;
+                            n[axis] += side;
+                            n[u] += du;
+                            n[v] += dv;
+                            lattice.node[lattice.node_index(n)]
+                        });
+                        faces.push(BoundaryFace {
+                            name: format!(
+                                "{}{}_{}",
+                                boxes[number as usize].0,
+                                AXES[axis],
+                                ["min", "max"][side]
+                            ),
+                            axis,
+                            sign: 2.0 * side as f64 - 1.0,
+                            area: width(u) * width(v),
+                            centre,
+                            corners,
+                        });
+                    }
+                }
+            }
+        }
+    }
+    faces
+}
+
+/// Facets of a set of faces: per particle and direction, the normal and the summed quarter areas.
+fn facets<'a>(faces: impl Iterator<Item = &'a BoundaryFace>) -> Vec<Facet> {
+    let mut areas: BTreeMap<(u32, usize, bool), f64> = BTreeMap::new();
+    for face in faces {
+        for corner in face.corners {
+            *areas.entry((corner, face.axis, face.sign > 0.0)).or_default() += 0.25 * face.area;
+        }
+    }
+    areas
+        .into_iter()
+        .map(|((particle, axis, positive), area)| {
+            let mut normal = [0.0; 3];
+            normal[axis] = if positive { 1.0 } else { -1.0 };
+            Facet { particle, normal, area }
+        })
+        .collect()
+}
+
+fn patches(
+    faces: &[BoundaryFace],
+    selections: &BTreeMap<String, PatchSelection>,
+) -> Result<Vec<PatchFacets>> {
+    let mut names: Vec<&str> = faces.iter().map(|f| f.name.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut patches: Vec<PatchFacets> = names
+        .iter()
+        .map(|name| PatchFacets {
+            name: (*name).to_string(),
+            facets: facets(faces.iter().filter(|f| f.name == *name)),
+        })
+        .collect();
+    for (name, selection) in selections {
+        if let Some(unknown) = selection.faces.iter().find(|f| !names.contains(&f.as_str())) {
+            return Err(Error::scene(
+                format!("patches.{name}.faces"),
+                format!("the body has no exposed face `{unknown}`; it has {}", names.join(", ")),
+            ));
+        }
+        let inside = |c: &[f64; 3]| {
+            (0..3).all(|a| {
+                selection.min.is_none_or(|min| c[a] >= min[a])
+                    && selection.max.is_none_or(|max| c[a] <= max[a])
+            })
+        };
+        let facets = facets(
+            faces.iter().filter(|f| selection.faces.contains(&f.name) && inside(&f.centre)),
+        );
+        if facets.is_empty() {
+            return Err(Error::scene(
+                format!("patches.{name}"),
+                "selects no particle: the centres of the lattice cell faces must lie in [min, max]",
+            )
+            .at_boundary(name));
+        }
+        patches.push(PatchFacets { name: name.clone(), facets });
+    }
+    Ok(patches)
+}

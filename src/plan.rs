@@ -1,0 +1,77 @@
+//! What a scene will cost and which physics it switches on, for `urlsph check`.
+
+use crate::scene::{Limiter, Neighbours, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights};
+
+/// What a scene will cost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Particles.
+    pub particles: usize,
+    /// Directed neighbour pairs.
+    pub pairs: usize,
+    /// Smallest, mean and largest number of neighbours.
+    pub neighbours: (usize, f64, usize),
+    /// Stable time step at the start [s].
+    pub stable_step: f64,
+    /// Estimated number of steps to the scene's end.
+    pub steps: u64,
+    /// Memory of the simulation [bytes].
+    pub memory: usize,
+    /// Physics and options that are on, one line each.
+    pub on: Vec<String>,
+    /// Physics and options that are off, one line each.
+    pub off: Vec<String>,
+}
+
+/// Physics and options that a scene has on and off.
+pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
+    let n = &scene.numerics;
+    let mut on = vec![match &scene.material {
+        crate::scene::Material::NeoHookean(_) => "neo-Hookean elasticity".to_string(),
+        crate::scene::Material::MooneyRivlin(_) => "Mooney-Rivlin elasticity".to_string(),
+    }];
+    on.push(match n.neighbours {
+        Neighbours::Lattice(count) => format!("{count} lattice neighbours"),
+        Neighbours::Radius { radius } => format!("neighbours within {radius} spacings"),
+    });
+    on.push(match n.weights {
+        Weights::Unit => "unit kernel weights".to_string(),
+        Weights::Tributary => "tributary kernel weights".to_string(),
+    });
+    let mut off = Vec::new();
+    let mut feature = |is_on: bool, name: String| {
+        if is_on { on.push(name) } else { off.push(name) }
+    };
+    let dissipation = match (n.reconstruction, n.limiter) {
+        (Reconstruction::None, _) => "Riemann dissipation D^p, first order",
+        (_, Limiter::None) => "Riemann dissipation D^p, linear reconstruction",
+        (_, Limiter::Minmod) => "Riemann dissipation D^p, linear reconstruction, minmod limiter",
+        (_, Limiter::Venkatakrishnan) => {
+            "Riemann dissipation D^p, linear reconstruction, Venkatakrishnan limiter"
+        }
+    };
+    feature(n.dissipation, dissipation.to_string());
+    feature(
+        n.state != StateMeasures::F,
+        match n.state {
+            StateMeasures::Fhj => "independent h and j".to_string(),
+            _ => "independent j".to_string(),
+        },
+    );
+    feature(
+        n.volume_dissipation > 0.0,
+        format!("volume dissipation D^j (coefficient {})", n.volume_dissipation),
+    );
+    feature(
+        n.reference_update != ReferenceUpdate::Never,
+        match n.reference_update {
+            ReferenceUpdate::Every(steps) => {
+                format!("reference update every {steps} steps, kernel option {}", n.kernel_option)
+            }
+            _ => format!("reference update every step, kernel option {}", n.kernel_option),
+        },
+    );
+    feature(n.angular_momentum_projection, "angular-momentum projection".to_string());
+    feature(scene.body_force.is_some(), "body force".to_string());
+    (on, off)
+}

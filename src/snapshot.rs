@@ -1,0 +1,244 @@
+//! Snapshots: the complete state in memory, and as bytes with a version and a checksum.
+
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+use crate::boundary::InputValues;
+use crate::error::{Code, Error, Result};
+use crate::formulation::url::State;
+use crate::layout::{Array, Layout};
+use crate::ledger::Accounts;
+use crate::reference::Updated;
+use crate::scene::Scene;
+
+/// A complete state: restoring it and stepping gives the same bits as never having left.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot {
+    pub(crate) scene_hash: u64,
+    pub(crate) time: f64,
+    pub(crate) steps: u64,
+    pub(crate) accounts: Accounts,
+    pub(crate) inputs: InputValues,
+    pub(crate) state: State,
+    pub(crate) updated: Option<Updated>,
+}
+
+const MAGIC: &[u8; 8] = b"URLSPHSN";
+/// Raised whenever the layout below changes.
+const FORMAT: u32 = 1;
+
+/// Hash of everything that determines the meaning of a state.
+pub(crate) fn scene_hash(scene: &Scene) -> u64 {
+    let text = serde_json::to_string(scene).expect("a scene is plain data");
+    xxh3_64(text.as_bytes())
+}
+
+/// Takes the parts of a snapshot in a fixed order: the writer, the hasher and the reader walk the same path.
+trait Walk {
+    fn word(&mut self, value: &mut u64) -> Result<()>;
+    fn numbers(&mut self, values: &mut [f64]) -> Result<()>;
+
+    fn number(&mut self, value: &mut f64) -> Result<()> {
+        self.numbers(std::slice::from_mut(value))
+    }
+    fn array<const N: usize>(&mut self, array: &mut Array<N>) -> Result<()> {
+        let (stride, particles) = (array.component_stride(), array.particles());
+        for component in array.flat_mut().chunks_exact_mut(stride) {
+            self.numbers(&mut component[Layout::FIRST..Layout::FIRST + particles])?;
+        }
+        Ok(())
+    }
+    fn optional<const N: usize>(&mut self, array: &mut Option<Array<N>>, layout: Layout) -> Result<()> {
+        let mut present = u64::from(array.is_some());
+        self.word(&mut present)?;
+        match present {
+            0 => *array = None,
+            1 => self.array(array.get_or_insert_with(|| Array::new(layout, identity())))?,
+            _ => return Err(damaged("an unknown flag")),
+        }
+        Ok(())
+    }
+}
+
+/// Dummies of a field that is read back: f, h and j are the identity there, all others irrelevant.
+fn identity<const N: usize>() -> [f64; N] {
+    std::array::from_fn(|c| if N == 9 && c % 4 != 0 { 0.0 } else { 1.0 })
+}
+
+impl Snapshot {
+    fn walk(&mut self, walk: &mut impl Walk) -> Result<()> {
+        walk.word(&mut self.scene_hash)?;
+        walk.number(&mut self.time)?;
+        walk.word(&mut self.steps)?;
+        let a = &mut self.accounts;
+        for value in [&mut a.initial, &mut a.external_work, &mut a.dissipation, &mut a.projection] {
+            walk.number(value)?;
+        }
+        let mut inputs = self.inputs.len() as u64;
+        walk.word(&mut inputs)?;
+        self.inputs.resize_with(checked_length(inputs)?, Vec::new);
+        for values in &mut self.inputs {
+            let mut length = values.len() as u64;
+            walk.word(&mut length)?;
+            values.resize(checked_length(length)?, 0.0);
+            walk.numbers(values)?;
+        }
+        let layout = self.state.x.layout();
+        walk.array(&mut self.state.x)?;
+        walk.array(&mut self.state.v)?;
+        walk.array(&mut self.state.f)?;
+        walk.optional(&mut self.state.h, layout)?;
+        walk.optional(&mut self.state.j, layout)?;
+        let mut updated = u64::from(self.updated.is_some());
+        walk.word(&mut updated)?;
+        if updated == 1 {
+            let u = self.updated.get_or_insert_with(|| Updated {
+                chi: Array::new(layout, [0.0; 3]),
+                f_chi: Array::new(layout, identity()),
+                j_chi: Array::new(layout, [1.0]),
+                h_chi: None,
+            });
+            walk.array(&mut u.chi)?;
+            walk.array(&mut u.f_chi)?;
+            walk.array(&mut u.j_chi)?;
+            walk.optional(&mut u.h_chi, layout)?;
+        }
+        Ok(())
+    }
+
+    /// Bytes, versioned and checksummed, little-endian.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut writer = Writer(Vec::new());
+        writer.0.extend_from_slice(MAGIC);
+        writer.0.extend_from_slice(&FORMAT.to_le_bytes());
+        writer.0.extend_from_slice(&(self.state.x.particles() as u32).to_le_bytes());
+        self.clone().walk(&mut writer).expect("writing to memory does not fail");
+        let sum = xxh3_64(&writer.0);
+        writer.0.extend_from_slice(&sum.to_le_bytes());
+        writer.0
+    }
+
+    /// Reads what [`to_bytes`](Self::to_bytes) wrote.
+    ///
+    /// # Errors
+    /// [`Code::Snapshot`] if truncated, damaged or of another version.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        const HEAD: usize = 16;
+        if bytes.len() < HEAD + 8 || &bytes[..8] != MAGIC {
+            return Err(damaged("it does not start like one"));
+        }
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+        if word(8) != FORMAT {
+            return Err(Error::new(
+                Code::Snapshot,
+                format!(
+                    "the snapshot has format {}, this library reads format {FORMAT}: use the \
+                     version of the library that wrote it",
+                    word(8)
+                ),
+            ));
+        }
+        let (body, sum) = bytes.split_at(bytes.len() - 8);
+        if xxh3_64(body).to_le_bytes() != sum {
+            return Err(damaged("its checksum does not match"));
+        }
+        let particles = word(12) as usize;
+        // Position, velocity and f of every particle must be there before memory is taken for them.
+        if particles == 0 || body.len() < particles * 15 * 8 {
+            return Err(damaged("it is too short for its particles"));
+        }
+        let layout = Layout::new(particles);
+        let mut snapshot = Self {
+            scene_hash: 0,
+            time: 0.0,
+            steps: 0,
+            accounts: Accounts::default(),
+            inputs: Vec::new(),
+            state: State {
+                x: Array::new(layout, [0.0; 3]),
+                v: Array::new(layout, [0.0; 3]),
+                f: Array::new(layout, identity()),
+                h: None,
+                j: None,
+            },
+            updated: None,
+        };
+        let mut reader = Reader(&body[HEAD..]);
+        snapshot.walk(&mut reader)?;
+        if reader.0.is_empty() { Ok(snapshot) } else { Err(damaged("it is too long")) }
+    }
+
+    /// Hash of the content.
+    pub fn hash(&self) -> u64 {
+        let mut hasher = Hasher(Xxh3::new());
+        self.clone().walk(&mut hasher).expect("hashing does not fail");
+        hasher.0.digest()
+    }
+}
+
+fn damaged(what: &str) -> Error {
+    Error::new(
+        Code::Snapshot,
+        format!("not a usable snapshot, {what}: take it again from a running simulation"),
+    )
+}
+
+/// Lengths come before their data: a damaged one must not ask for all the memory there is.
+fn checked_length(length: u64) -> Result<usize> {
+    if length <= 1 << 32 { Ok(length as usize) } else { Err(damaged("a length in it is absurd")) }
+}
+
+struct Writer(Vec<u8>);
+
+impl Walk for Writer {
+    fn word(&mut self, value: &mut u64) -> Result<()> {
+        self.0.extend_from_slice(&value.to_le_bytes());
+        Ok(())
+    }
+    fn numbers(&mut self, values: &mut [f64]) -> Result<()> {
+        self.0.reserve(8 * values.len());
+        for v in values {
+            self.0.extend_from_slice(&v.to_le_bytes());
+        }
+        Ok(())
+    }
+}
+
+struct Hasher(Xxh3);
+
+impl Walk for Hasher {
+    fn word(&mut self, value: &mut u64) -> Result<()> {
+        self.0.update(&value.to_le_bytes());
+        Ok(())
+    }
+    fn numbers(&mut self, values: &mut [f64]) -> Result<()> {
+        for v in values {
+            self.0.update(&v.to_le_bytes());
+        }
+        Ok(())
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn take(&mut self, length: usize) -> Result<&[u8]> {
+        let (head, rest) =
+            self.0.split_at_checked(length).ok_or_else(|| damaged("it ends too early"))?;
+        self.0 = rest;
+        Ok(head)
+    }
+}
+
+impl Walk for Reader<'_> {
+    fn word(&mut self, value: &mut u64) -> Result<()> {
+        *value = u64::from_le_bytes(self.take(8)?.try_into().expect("eight bytes"));
+        Ok(())
+    }
+    fn numbers(&mut self, values: &mut [f64]) -> Result<()> {
+        let bytes = self.take(8 * values.len())?;
+        for (v, b) in values.iter_mut().zip(bytes.chunks_exact(8)) {
+            *v = f64::from_le_bytes(b.try_into().expect("eight bytes"));
+        }
+        Ok(())
+    }
+}
