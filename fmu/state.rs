@@ -4,7 +4,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::instance::Phase;
 use crate::error::{Code, Error, Result};
-use crate::simulation::Snapshot;
+use crate::snapshot::Snapshot;
 
 /// First bytes of a serialised state; the digit is the version of the layout.
 const MAGIC: &[u8; 16] = b"urlsph-fmustate1";

@@ -164,11 +164,19 @@ impl Lane for F64x8 {
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        lanewise!(|i| if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] })
+        lanewise!(|i| if self.0[i] < other.0[i] {
+            self.0[i]
+        } else {
+            other.0[i]
+        })
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        lanewise!(|i| if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] })
+        lanewise!(|i| if self.0[i] > other.0[i] {
+            self.0[i]
+        } else {
+            other.0[i]
+        })
     }
     #[inline(always)]
     fn if_positive(self, yes: Self, no: Self) -> Self {

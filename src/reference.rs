@@ -55,7 +55,11 @@ impl Slices {
     }
 
     fn new(graph: &Graph, layout: Layout) -> Self {
-        let mut this = Self { start: vec![0], base: Vec::new(), weight: Vec::new() };
+        let mut this = Self {
+            start: vec![0],
+            base: Vec::new(),
+            weight: Vec::new(),
+        };
         let mut offsets = Vec::new();
         for slice in 0..layout.slices {
             let first = slice * WIDTH;
@@ -68,7 +72,11 @@ impl Slices {
             offsets.dedup();
             // A lane of the slice has a neighbour at each offset, so the base is at most 7 slots
             // before the first particle: inside the guard.
-            this.base.extend(offsets.iter().map(|o| (Layout::slot(first) as i64 + o) as u32));
+            this.base.extend(
+                offsets
+                    .iter()
+                    .map(|o| (Layout::slot(first) as i64 + o) as u32),
+            );
             this.weight.resize(this.base.len(), F64x8([0.0; WIDTH]));
             this.start.push(this.base.len() as u32);
         }
@@ -80,7 +88,9 @@ impl Slices {
         let (slice, lane) = (a / WIDTH, a % WIDTH);
         let range = self.start[slice] as usize..self.start[slice + 1] as usize;
         let base = (Layout::slot(b) - lane) as u32;
-        let at = self.base[range.clone()].binary_search(&base).expect("pair in its slice");
+        let at = self.base[range.clone()]
+            .binary_search(&base)
+            .expect("pair in its slice");
         (range.start + at) * WIDTH + lane
     }
 }
@@ -184,12 +194,22 @@ pub struct Reference {
 
 #[inline(always)]
 pub(crate) fn load3<T: Lane>(from: &[&[f64]; 3], at: usize) -> Vec3<T> {
-    [T::load(from[0], at), T::load(from[1], at), T::load(from[2], at)]
+    [
+        T::load(from[0], at),
+        T::load(from[1], at),
+        T::load(from[2], at),
+    ]
 }
 
 #[inline(always)]
 pub(crate) fn load9<T: Lane>(from: &[&[f64]; 9], at: usize) -> Mat3<T> {
-    let row = |r: usize| [T::load(from[r], at), T::load(from[r + 1], at), T::load(from[r + 2], at)];
+    let row = |r: usize| {
+        [
+            T::load(from[r], at),
+            T::load(from[r + 1], at),
+            T::load(from[r + 2], at),
+        ]
+    };
     [row(0), row(3), row(6)]
 }
 
@@ -226,7 +246,10 @@ fn pull_back(
 ) -> (Vec3<F64x8>, Mat3<F64x8>) {
     let sum = add9(&load9::<F64x8>(f_chi, a), &load9(f_chi, b));
     let inverse = inverse(&scale9(F64x8::splat(0.5), &sum));
-    (mat_vec(&inverse, sub3(load3(chi, b), load3(chi, a))), inverse)
+    (
+        mat_vec(&inverse, sub3(load3(chi, b), load3(chi, a))),
+        inverse,
+    )
 }
 
 const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
@@ -287,7 +310,11 @@ impl Reference {
         };
         let h: Vec<f64> = parallel::fill(graph.count(), |a| {
             self.smoothing_factor
-                * graph.of(a).iter().map(|&b| distance(a, b)).fold(0.0, f64::max)
+                * graph
+                    .of(a)
+                    .iter()
+                    .map(|&b| distance(a, b))
+                    .fold(0.0, f64::max)
         });
         // Lengths and volumes over their means: weights of order one in any unit system.
         let unit = h.iter().sum::<f64>() / h.len() as f64;
@@ -299,7 +326,8 @@ impl Reference {
                 Weights::Unit => 0.5 * (kernel::slope(r, ha) + kernel::slope(r, hb)),
                 // V_b as printed; V_a, common to all pairs of a, makes the weight symmetric.
                 Weights::Tributary => {
-                    particles.volumes[a] * particles.volumes[b as usize] / (mean_volume * mean_volume)
+                    particles.volumes[a] * particles.volumes[b as usize]
+                        / (mean_volume * mean_volume)
                         * kernel::slope(r, hb)
                 }
             }
@@ -332,13 +360,19 @@ impl Reference {
 
     fn new_stored(&self) -> StoredVectors {
         let zeros = || std::array::from_fn(|_| vec![F64x8([0.0; WIDTH]); self.slices.base.len()]);
-        StoredVectors { ab: zeros(), ba: zeros() }
+        StoredVectors {
+            ab: zeros(),
+            ba: zeros(),
+        }
     }
 
     /// The pair vectors now.
     pub fn pair_vectors(&self) -> Pairs<'_> {
         match &self.stored {
-            None => Pairs::Lean(Lean { k: self.slices.weights(), x: self.x_initial.components() }),
+            None => Pairs::Lean(Lean {
+                k: self.slices.weights(),
+                x: self.x_initial.components(),
+            }),
             Some(s) => Pairs::Stored(Stored {
                 ab: std::array::from_fn(|c| bytemuck::must_cast_slice(&s.ab[c][..])),
                 ba: std::array::from_fn(|c| bytemuck::must_cast_slice(&s.ba[c][..])),
@@ -362,11 +396,9 @@ impl Reference {
     fn correct(&mut self) -> Option<usize> {
         let mut l = std::mem::replace(&mut self.l, Array::new(self.layout, [0.0; 9]));
         let this = &*self;
-        let bad = parallel::map_slabs(l.slabs_mut(), |slab, mut out| {
-            match this.pair_vectors() {
-                Pairs::Lean(pairs) => this.correct_slab(pairs, slab, &mut out),
-                Pairs::Stored(pairs) => this.correct_slab(pairs, slab, &mut out),
-            }
+        let bad = parallel::map_slabs(l.slabs_mut(), |slab, mut out| match this.pair_vectors() {
+            Pairs::Lean(pairs) => this.correct_slab(pairs, slab, &mut out),
+            Pairs::Stored(pairs) => this.correct_slab(pairs, slab, &mut out),
         });
         self.l = l;
         bad.into_iter().flatten().next()
@@ -429,8 +461,15 @@ impl Reference {
 
     /// g_ab of options #3 and #4 from chi and F_chi.
     fn updated_vectors(&mut self) {
-        let u = self.updated.as_ref().expect("called for an updated reference");
-        let (chi, f_chi, j_chi) = (u.chi.components(), u.f_chi.components(), u.j_chi.components()[0]);
+        let u = self
+            .updated
+            .as_ref()
+            .expect("called for an updated reference");
+        let (chi, f_chi, j_chi) = (
+            u.chi.components(),
+            u.f_chi.components(),
+            u.j_chi.components()[0],
+        );
         let volume = self.volume.components()[0];
         let weights = self.slices.weights();
         let mut h = Array::<1>::new(self.layout, [1.0]);
@@ -447,14 +486,18 @@ impl Reference {
                             let mask = F64x8::load(weights, pair);
                             longest = mask.if_positive(longest.max(dot(r, r)), longest);
                         });
-                        (longest.sqrt() * F64x8::splat(self.smoothing_factor)).store(out, i * WIDTH);
+                        (longest.sqrt() * F64x8::splat(self.smoothing_factor))
+                            .store(out, i * WIDTH);
                     }
                 },
             );
         });
         let particles = self.layout.particles as f64;
         let mean = |values: &[f64]| {
-            values[Layout::FIRST..Layout::FIRST + self.layout.particles].iter().sum::<f64>() / particles
+            values[Layout::FIRST..Layout::FIRST + self.layout.particles]
+                .iter()
+                .sum::<f64>()
+                / particles
         };
         let h = h.components()[0];
         let (unit, mean_volume) = (mean(h), mean(volume));
@@ -500,7 +543,8 @@ impl Reference {
                             let (r, f_inverse) = pull_back(&f_chi, &chi, a, b);
                             let hb = F64x8::load(h, b) / s(unit);
                             let length = dot(r, r).sqrt() / s(unit);
-                            let (with_b, with_a) = (kernel::slope(length, hb), kernel::slope(length, ha));
+                            let (with_b, with_a) =
+                                (kernel::slope(length, hb), kernel::slope(length, ha));
                             let (k, back) = if tributary {
                                 let v = va * (F64x8::load(volume, b) / s(mean_volume));
                                 if option == 4 {
@@ -515,8 +559,11 @@ impl Reference {
                                 let mean = s(0.5) * (with_a + with_b);
                                 (mean, mean)
                             };
-                            let direction =
-                                if option == 4 { mat_vec(&transpose(&f_inverse), r) } else { r };
+                            let direction = if option == 4 {
+                                mat_vec(&transpose(&f_inverse), r)
+                            } else {
+                                r
+                            };
                             let mask = F64x8::load(weights, pair);
                             let entry = pair / WIDTH - offset;
                             for c in 0..3 {
@@ -540,7 +587,11 @@ impl Reference {
                 + u.h_chi.as_ref().map_or(0, Array::bytes)
         });
         let entries = self.slices.base.len();
-        let stored = if self.stored.is_some() { entries * 6 * size_of::<F64x8>() } else { 0 };
+        let stored = if self.stored.is_some() {
+            entries * 6 * size_of::<F64x8>()
+        } else {
+            0
+        };
         entries * (size_of::<F64x8>() + size_of::<u32>())
             + self.slices.start.len() * size_of::<u32>()
             + self.x_initial.bytes()

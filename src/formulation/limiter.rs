@@ -12,7 +12,11 @@ pub fn venkatakrishnan<T: Lane>(rise: T, fall: T, step: T) -> T {
     let s = T::splat;
     let admissible = step.if_positive(rise, -fall);
     let magnitude = step.max(-step);
-    let (a2, ab, b2) = (admissible * admissible, admissible * magnitude, magnitude * magnitude);
+    let (a2, ab, b2) = (
+        admissible * admissible,
+        admissible * magnitude,
+        magnitude * magnitude,
+    );
     let tiny = s(1e-300);
     (a2 + s(2.0) * ab + tiny) / (a2 + ab + s(2.0) * b2 + tiny)
 }

@@ -157,7 +157,9 @@ impl<'a> Kinematics<'a> {
             h: state.h.as_ref().map(Array::components),
             j: state.j.as_ref().map(|j| j.components()[0]),
             f_chi: updated.map(|u| u.f_chi.components()),
-            h_chi: updated.and_then(|u| u.h_chi.as_ref()).map(Array::components),
+            h_chi: updated
+                .and_then(|u| u.h_chi.as_ref())
+                .map(Array::components),
             j_chi: updated.map(|u| u.j_chi.components()[0]),
         }
     }
@@ -171,13 +173,17 @@ impl<'a> Kinematics<'a> {
         }
         let mut h = cofactor(&f);
         let mut j = dot(f[0], h[0]);
-        if STATE >= 1 && let Some(own) = self.j {
+        if STATE >= 1
+            && let Some(own) = self.j
+        {
             j = T::load(own, at);
             if UPDATED && let Some(j_chi) = self.j_chi {
                 j = j * T::load(j_chi, at);
             }
         }
-        if STATE >= 2 && let Some(own) = &self.h {
+        if STATE >= 2
+            && let Some(own) = &self.h
+        {
             h = load9(own, at);
             if UPDATED && let Some(h_chi) = &self.h_chi {
                 h = mat_mul(&h, &load9(h_chi, at));
@@ -213,8 +219,7 @@ impl Url {
                 s: Array::new(layout, [0.0; 9]),
                 half_grad: Array::new(layout, [0.0; 9]),
                 wave: Array::new(layout, [1.0; 2]),
-                sigma_j: volume
-                    .then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
+                sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
             },
             rates: Rates {
                 force: Array::new(layout, [0.0; 3]),
@@ -238,7 +243,12 @@ impl Url {
     }
 
     /// Total deformation of the particle in a slot.
-    pub fn deformation(&self, state: &State, reference: &Reference, slot: usize) -> Deformation<f64> {
+    pub fn deformation(
+        &self,
+        state: &State,
+        reference: &Reference,
+        slot: usize,
+    ) -> Deformation<f64> {
         self.total_of(&Kinematics::new(state, reference), slot)
     }
 
@@ -270,7 +280,10 @@ impl Url {
         state: &State,
         reference: &Reference,
     ) -> std::result::Result<Evaluation, Breakdown> {
-        let mut total = Evaluation { length: f64::INFINITY, ..Evaluation::default() };
+        let mut total = Evaluation {
+            length: f64::INFINITY,
+            ..Evaluation::default()
+        };
         for point in self.points::<T>(state, reference) {
             let (strain, kinetic) = point?;
             total.strain += strain;
@@ -296,7 +309,12 @@ impl Url {
         state: &State,
         reference: &Reference,
     ) -> Vec<std::result::Result<(f64, f64), Breakdown>> {
-        let Self { law, options, scratch, rates } = self;
+        let Self {
+            law,
+            options,
+            scratch,
+            rates,
+        } = self;
         let layout = reference.layout;
         let velocity = state.v.components();
         let kinematics = Kinematics::new(state, reference);
@@ -313,14 +331,25 @@ impl Url {
             .zip(scratch.wave.slabs_mut())
             .map(|((((grad_v, q), s), half_grad), wave)| {
                 let sigma_j = sigma_j.as_mut().and_then(Iterator::next).map(|[s]| s);
-                PointOutput { grad_v, q, s, half_grad, wave, sigma_j }
+                PointOutput {
+                    grad_v,
+                    q,
+                    s,
+                    half_grad,
+                    wave,
+                    sigma_j,
+                }
             })
             .collect();
         parallel::map_slabs(slabs, |slab, mut out| {
             let (first, slices) = layout.slab_range(slab);
             match reference.pair_vectors() {
-                Pairs::Lean(p) => gradient_slab::<T, _>(p, reference, &velocity, first, slices, &mut out.grad_v),
-                Pairs::Stored(p) => gradient_slab::<T, _>(p, reference, &velocity, first, slices, &mut out.grad_v),
+                Pairs::Lean(p) => {
+                    gradient_slab::<T, _>(p, reference, &velocity, first, slices, &mut out.grad_v)
+                }
+                Pairs::Stored(p) => {
+                    gradient_slab::<T, _>(p, reference, &velocity, first, slices, &mut out.grad_v)
+                }
             }
             macro_rules! point {
                 ($law:expr, $($state:pat => $n:literal),*) => {
@@ -384,7 +413,12 @@ impl Url {
     /// Force pass; power of the dissipation and squared length by slab.
     fn forces<T: Lane>(&mut self, state: &State, reference: &Reference) -> Vec<(f64, f64)> {
         let speeds = self.wave_speeds();
-        let Self { options, scratch, rates, .. } = self;
+        let Self {
+            options,
+            scratch,
+            rates,
+            ..
+        } = self;
         let input = ForceInput::new(state, reference, scratch);
         parallel::map_slabs(rates.force.slabs_mut(), |slab, mut out| {
             let (first, slices) = reference.layout.slab_range(slab);
@@ -407,7 +441,12 @@ impl Url {
     /// dj/dt by D^j; returns the power that it dissipates.
     fn volume_rates<T: Lane>(&mut self, state: &State, reference: &Reference) -> f64 {
         let speed = self.wave_speeds().pressure;
-        let Self { options, scratch, rates, .. } = self;
+        let Self {
+            options,
+            scratch,
+            rates,
+            ..
+        } = self;
         let (Some((sigma_j, slope)), Some(out)) =
             (scratch.sigma_j.take(), rates.j_dissipation.as_mut())
         else {
@@ -420,10 +459,26 @@ impl Url {
                 let (first, slices) = reference.layout.slab_range(slab);
                 match reference.pair_vectors() {
                     Pairs::Lean(p) => {
-                        half_slope_slab::<T, _>(p, reference, &kinematics, sigma, first, slices, &mut out);
+                        half_slope_slab::<T, _>(
+                            p,
+                            reference,
+                            &kinematics,
+                            sigma,
+                            first,
+                            slices,
+                            &mut out,
+                        );
                     }
                     Pairs::Stored(p) => {
-                        half_slope_slab::<T, _>(p, reference, &kinematics, sigma, first, slices, &mut out);
+                        half_slope_slab::<T, _>(
+                            p,
+                            reference,
+                            &kinematics,
+                            sigma,
+                            first,
+                            slices,
+                            &mut out,
+                        );
                     }
                 }
             });
@@ -439,8 +494,12 @@ impl Url {
         let powers = parallel::map_slabs(out.slabs_mut(), |slab, [out]| {
             let (first, slices) = reference.layout.slab_range(slab);
             match reference.pair_vectors() {
-                Pairs::Lean(p) => volume_slab::<T, _>(p, reference, &input, &volume, first, slices, out),
-                Pairs::Stored(p) => volume_slab::<T, _>(p, reference, &input, &volume, first, slices, out),
+                Pairs::Lean(p) => {
+                    volume_slab::<T, _>(p, reference, &input, &volume, first, slices, out)
+                }
+                Pairs::Stored(p) => {
+                    volume_slab::<T, _>(p, reference, &input, &volume, first, slices, out)
+                }
             }
         });
         scratch.sigma_j = Some((sigma_j, slope));
@@ -460,9 +519,16 @@ impl Url {
         let layout = reference.layout;
         let density = self.law.density();
         let volume = reference.volume.components()[0];
-        let (force, grad_v) = (self.rates.force.components(), self.rates.grad_v.components());
+        let (force, grad_v) = (
+            self.rates.force.components(),
+            self.rates.grad_v.components(),
+        );
         let j_rate = self.rates.j_dissipation.as_ref().map(|r| r.components()[0]);
-        let (x0, v0, f0) = (start.x.components(), start.v.components(), start.f.components());
+        let (x0, v0, f0) = (
+            start.x.components(),
+            start.v.components(),
+            start.f.components(),
+        );
         let h0 = start.h.as_ref().map(Array::components);
         let j0 = start.j.as_ref().map(|j| j.components()[0]);
         let mut h = state.h.as_mut().map(|h| h.slabs_mut().into_iter());
@@ -485,7 +551,11 @@ impl Url {
                 #[inline(always)]
                 || {
                     let s = F64x8::splat;
-                    let blend = Blend { keep: s(keep), take: s(take), dt: s(dt) };
+                    let blend = Blend {
+                        keep: s(keep),
+                        take: s(take),
+                        dt: s(dt),
+                    };
                     for i in 0..slices {
                         let (at, a) = (i * WIDTH, first + i * WIDTH);
                         let v_now = load_slab3::<F64x8>(&v, at);
@@ -496,7 +566,11 @@ impl Url {
                         let acceleration = scale3(s(1.0) / mass, load3(&force, a));
                         let x_now = load_slab3::<F64x8>(&x, at);
                         store3(&blend.vector(&load3(&x0, a), &x_now, &v_now), &mut x, at);
-                        store3(&blend.vector(&load3(&v0, a), &v_now, &acceleration), &mut v, at);
+                        store3(
+                            &blend.vector(&load3(&v0, a), &v_now, &acceleration),
+                            &mut v,
+                            at,
+                        );
                         store9(&blend.tensor(&load9(&f0, a), &f_now, &grad), &mut f, at);
                         if let (Some(j), Some(j0)) = (&mut j, j0) {
                             // dj/dt = h : grad v (56), with h = cof f where it is not independent.
@@ -507,7 +581,9 @@ impl Url {
                             if let Some(extra) = j_rate {
                                 rate = rate + F64x8::load(extra, a);
                             }
-                            blend.scalar(F64x8::load(j0, a), F64x8::load(j, at), rate).store(j, at);
+                            blend
+                                .scalar(F64x8::load(j0, a), F64x8::load(j, at), rate)
+                                .store(j, at);
                         }
                         if let (Some(h), Some(h0)) = (&mut h, &h0) {
                             // dh/dt = f x grad v (55).
@@ -532,7 +608,9 @@ impl Url {
         state: &mut State,
         reference: &mut Reference,
     ) -> std::result::Result<(), Breakdown> {
-        let Some(old) = reference.updated.clone() else { return Ok(()) };
+        let Some(old) = reference.updated.clone() else {
+            return Ok(());
+        };
         let layout = reference.layout;
         let mut new = old.clone();
         let kinematics = Kinematics::new(state, reference);
@@ -640,12 +718,22 @@ struct PointOutput<'a> {
 
 #[inline(always)]
 fn load_slab3<T: Lane>(from: &[&mut [f64]; 3], at: usize) -> Vec3<T> {
-    [T::load(from[0], at), T::load(from[1], at), T::load(from[2], at)]
+    [
+        T::load(from[0], at),
+        T::load(from[1], at),
+        T::load(from[2], at),
+    ]
 }
 
 #[inline(always)]
 fn load_slab9<T: Lane>(from: &[&mut [f64]; 9], at: usize) -> Mat3<T> {
-    let row = |r: usize| [T::load(from[r], at), T::load(from[r + 1], at), T::load(from[r + 2], at)];
+    let row = |r: usize| {
+        [
+            T::load(from[r], at),
+            T::load(from[r + 1], at),
+            T::load(from[r + 2], at),
+        ]
+    };
     [row(0), row(3), row(6)]
 }
 
@@ -701,7 +789,11 @@ fn point_slab<T: Lane, M: Material, const STATE: u8, const UPDATED: bool>(
                 let (l, v_r) = (load9::<T>(&l, a), T::load(volume, a));
 
                 // Smallest stretch of F: 1/lambda^2 is the largest eigenvalue of F^-T F^-1.
-                let cof = if STATE >= 2 { cofactor(&total.f) } else { total.h };
+                let cof = if STATE >= 2 {
+                    cofactor(&total.f)
+                } else {
+                    total.h
+                };
                 let det = dot(total.f[0], cof[0]);
                 let largest = largest_eigenvalue(&mat_mul_t(&cof, &cof));
                 let stretch = det / largest.sqrt();
@@ -719,7 +811,8 @@ fn point_slab<T: Lane, M: Material, const STATE: u8, const UPDATED: bool>(
                 // Q = V_R P F_chi^T L and S = V_chi h L.
                 let mut k = scale9(v_r, &l);
                 let mut v_chi = v_r;
-                if UPDATED && let (Some(f_chi), Some(j_chi)) = (&kinematics.f_chi, kinematics.j_chi) {
+                if UPDATED && let (Some(f_chi), Some(j_chi)) = (&kinematics.f_chi, kinematics.j_chi)
+                {
                     k = mat_mul(&transpose(&load9(f_chi, a)), &k);
                     v_chi = v_r * T::load(j_chi, a);
                 }
@@ -741,8 +834,10 @@ fn point_slab<T: Lane, M: Material, const STATE: u8, const UPDATED: bool>(
                     strain += energy[lane];
                     kinetic += motion[lane];
                     if !(jacobian[lane] > 0.0 && jacobian[lane] < f64::INFINITY) {
-                        breakdown = breakdown
-                            .or(Some(Breakdown { slot: a + lane, jacobian: jacobian[lane] }));
+                        breakdown = breakdown.or(Some(Breakdown {
+                            slot: a + lane,
+                            jacobian: jacobian[lane],
+                        }));
                     }
                 }
             }
@@ -841,15 +936,17 @@ fn force_slab<T: Lane, P: PairVectors, const MODE: u8>(
                     let (g, back) = pairs.pair(centre, b, pair);
                     let mut p = input.pair(&here, b);
                     let mask = T::load(weights, pair);
-                    length2 = length2
-                        .min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
+                    length2 = length2.min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
                     let mut f = sub3(mat_vec(&qa, g), mat_vec(&load9(&input.q, b), back));
                     if MODE != riemann::OFF {
                         p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(&input.s, b), back));
                         let (half_a, half_b) = if MODE == riemann::CONSTANT {
                             (zero3(), zero3())
                         } else {
-                            (mat_vec(&grad_a, p.dx), mat_vec(&load9(&input.half_grad, b), p.dx))
+                            (
+                                mat_vec(&grad_a, p.dx),
+                                mat_vec(&load9(&input.half_grad, b), p.dx),
+                            )
                         };
                         let jump = riemann::jump::<T, MODE>(&p, half_a, half_b);
                         let d = riemann::dissipation(&p, jump, speeds);
@@ -976,16 +1073,25 @@ pub fn deform(state: &mut State, reference: &Reference) {
         let (first, slices) = layout.slab_range(slab);
         match reference.pair_vectors() {
             Pairs::Lean(p) => gradient_slab::<F64x8, _>(p, reference, &x, first, slices, &mut out),
-            Pairs::Stored(p) => gradient_slab::<F64x8, _>(p, reference, &x, first, slices, &mut out),
+            Pairs::Stored(p) => {
+                gradient_slab::<F64x8, _>(p, reference, &x, first, slices, &mut out)
+            }
         }
     });
     for slot in (0..layout.particles).map(Layout::slot) {
         let own = f.get(slot);
-        let m = [[own[0], own[1], own[2]], [own[3], own[4], own[5]], [own[6], own[7], own[8]]];
+        let m = [
+            [own[0], own[1], own[2]],
+            [own[3], own[4], own[5]],
+            [own[6], own[7], own[8]],
+        ];
         let cof = cofactor(&m);
         state.f.set(slot, own);
         if let Some(h) = &mut state.h {
-            h.set(slot, *cof.as_flattened().first_chunk().expect("nine components"));
+            h.set(
+                slot,
+                *cof.as_flattened().first_chunk().expect("nine components"),
+            );
         }
         if let Some(j) = &mut state.j {
             j.set(slot, [dot(m[0], cof[0])]);

@@ -1,1 +1,49 @@
-fn main() {}
+//! The project's tasks: `cargo xtask <task>`.
+
+mod demo;
+mod output_tests;
+mod project;
+mod tally;
+mod test;
+mod validate;
+mod venv;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+const HELP: &str = "\
+Usage: cargo xtask <TASK>
+
+Tasks:
+  demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
+              fields, histories and pictures under target/demo/
+  test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
+  validate    The long comparisons with reference solutions, with residuals and tolerances
+";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &[String]) -> Result<()> {
+    let sh = project::shell()?;
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match arguments.as_slice() {
+        ["demo"] => demo::demo(&sh),
+        ["test"] => test::test(&sh),
+        ["validate"] => validate::validate(&sh),
+        [] | ["help" | "-h" | "--help"] => {
+            print!("{HELP}");
+            Ok(())
+        }
+        other => bail!("there is no task `{}`\n\n{HELP}", other.join(" ")),
+    }
+}
