@@ -34,6 +34,7 @@
 
 mod boundary;
 pub mod error;
+pub mod ffi;
 pub mod fields;
 #[cfg(feature = "fmi")]
 #[allow(unsafe_code)] // The C functions of FMI.

@@ -1,6 +1,8 @@
 //! The project's tasks: `cargo xtask <task>`.
 
 mod demo;
+mod header;
+mod install;
 mod output_tests;
 mod project;
 mod tally;
@@ -18,6 +20,8 @@ Usage: cargo xtask <TASK>
 Tasks:
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
+  header      Generate include/urlsph.h; with --check only see whether it is up to date
+  install     --prefix DIR [--destdir DIR]: library, headers, pkg-config and CMake files
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
   validate    The long comparisons with reference solutions, with residuals and tolerances
 ";
@@ -38,6 +42,9 @@ fn run(arguments: &[String]) -> Result<()> {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments.as_slice() {
         ["demo"] => demo::demo(&sh),
+        ["header"] => header::header(&sh, false),
+        ["header", "--check"] => header::header(&sh, true),
+        ["install", arguments @ ..] => install::install(&sh, arguments),
         ["test"] => test::test(&sh),
         ["validate"] => validate::validate(&sh),
         [] | ["help" | "-h" | "--help"] => {

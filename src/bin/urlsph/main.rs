@@ -1,13 +1,14 @@
-//! The command line: `urlsph run | check | schema`.
+//! The command line: `urlsph run | check | schema | fmu`.
 
 mod check;
 mod run;
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use urlsph::fmu::{self, FmiVersion};
 use urlsph::{Code, Error, Result, Scene, Simulation};
 
 /// Large-strain solid dynamics by Updated Reference Lagrangian SPH.
@@ -34,6 +35,20 @@ enum Command {
     },
     /// Prints the JSON Schema of a scene.
     Schema,
+    /// Packages a scene with the library as a co-simulation FMU.
+    Fmu {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// The FMU to write; an older one is replaced.
+        #[arg(short, long, value_name = "FILE.fmu")]
+        output: PathBuf,
+        /// Version of FMI.
+        #[arg(long, value_enum, default_value = "3")]
+        fmi: Fmi,
+        /// The shared library that goes into the FMU; searched for beside this program unless given.
+        #[arg(long, value_name = "PATH")]
+        library: Option<PathBuf>,
+    },
 }
 
 /// The scene that a command works on.
@@ -53,6 +68,14 @@ impl SceneArguments {
     }
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum Fmi {
+    #[value(name = "2")]
+    Two,
+    #[value(name = "3")]
+    Three,
+}
+
 fn main() -> ExitCode {
     // Wrong usage ends here, with exit status 2.
     let cli = Cli::parse();
@@ -63,6 +86,12 @@ fn main() -> ExitCode {
             .and_then(|scene| Simulation::with_threads(scene, threads))
             .and_then(|simulation| print(&check::report(&simulation))),
         Command::Schema => print(&format!("{:#}\n", urlsph::scene::json_schema())),
+        Command::Fmu {
+            scene,
+            output,
+            fmi,
+            library,
+        } => package(&scene, &output, fmi, library),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -87,4 +116,23 @@ fn print(text: &str) -> Result<()> {
         )),
         _ => Ok(()),
     }
+}
+
+/// `urlsph fmu`.
+fn package(
+    scene: &SceneArguments,
+    output: &Path,
+    version: Fmi,
+    library: Option<PathBuf>,
+) -> Result<()> {
+    let scene = scene.load()?;
+    let library = match library {
+        Some(path) => path,
+        None => fmu::find_library()?,
+    };
+    let version = match version {
+        Fmi::Two => FmiVersion::V2,
+        Fmi::Three => FmiVersion::V3,
+    };
+    fmu::package(&scene, version, &library, output)
 }
