@@ -420,6 +420,7 @@ fn overrides_reach_any_value() {
     assert_eq!(set("title=\"x\"").title, "x");
     assert_eq!(set("title=A = B").title, "A = B");
     assert_eq!(set(" time.end = 3").time.end, 3.0);
+    assert_eq!(set("title = one two ").title, "one two");
     assert_eq!(set("probes.new=[0, 1, 0]").probes["new"], [0.0, 1.0, 0.0]);
     assert_eq!(set("probes.top_corner[1]=5e0").probes["top_corner"][1], 5.0);
     assert_eq!(

@@ -89,7 +89,7 @@ fn apply(tree: &mut Value, text: &str) -> Result<()> {
     // A text that is not JSON stands for itself, so that a title or an expression needs no quotes.
     let value = match serde_json::from_str(value) {
         Ok(Strict(value)) => value,
-        Err(_) => Value::String(value.to_owned()),
+        Err(_) => Value::String(value.trim().to_owned()),
     };
     let mut node = tree;
     let mut rest = path;
