@@ -1,7 +1,6 @@
 //! The archive: description, shared library, scene, documentation, licences, icon.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufWriter, Read, Seek, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use zip::write::SimpleFileOptions;
@@ -10,6 +9,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use super::table::Table;
 use super::{FmiVersion, MODEL_IDENTIFIER, description, documentation};
 use crate::error::{Code, Error, Result};
+use crate::output::replace_file;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 
@@ -88,7 +88,7 @@ pub fn package(scene: &Scene, version: FmiVersion, library: &Path, out: &Path) -
             ));
         }
     }
-    write_atomically(out, |file| {
+    replace_file(out, |file| {
         let mut archive = ZipWriter::new(file);
         for (name, content) in &files {
             let executable = name.starts_with("binaries/");
@@ -172,24 +172,12 @@ pub fn find_library() -> Result<PathBuf> {
     })
 }
 
-fn io_error(path: &Path, error: &std::io::Error) -> Error {
-    Error::new(Code::Io, format!("{}: {error}", path.display()))
-}
-
 /// Reads the library and checks that it is one of ours, of this version.
 fn read_library(path: &Path) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|mut file| file.read_to_end(&mut bytes))
-        .map_err(|e| io_error(path, &e))?;
-    let (prefix, _) = MARK.split_at(MARK.find(' ').map_or(0, |i| i + 1));
-    let found = bytes
-        .windows(prefix.len())
-        .enumerate()
-        .filter(|(_, window)| *window == prefix.as_bytes())
-        .map(|(at, _)| &bytes[at..])
-        .find(|rest| rest.starts_with(MARK.as_bytes()));
-    if found.is_some() {
+    let bytes = std::fs::read(path)
+        .map_err(|e| Error::new(Code::Io, format!("cannot read `{}`: {e}", path.display())))?;
+    let found = bytes.windows(MARK.len()).any(|window| window == MARK.as_bytes());
+    if found {
         Ok(bytes)
     } else {
         Err(Error::argument(format!(
@@ -199,38 +187,3 @@ fn read_library(path: &Path) -> Result<Vec<u8>> {
         )))
     }
 }
-
-/// Writes beside the file and renames, so that nobody sees half of it.
-fn write_atomically(
-    path: &Path,
-    body: impl FnOnce(&mut dyn WriteSeek) -> std::io::Result<()>,
-) -> Result<()> {
-    let name = path
-        .file_name()
-        .ok_or_else(|| Error::argument(format!("{} is not the path of a file", path.display())))?;
-    let mut temporary_name = std::ffi::OsString::from(".");
-    temporary_name.push(name);
-    temporary_name.push(format!(".{}.part", std::process::id()));
-    let temporary = path.with_file_name(temporary_name);
-    let write = || {
-        let file = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .open(&temporary)?;
-        let mut writer = BufWriter::new(file);
-        body(&mut writer)?;
-        writer.flush()?;
-        writer.get_ref().sync_all()
-    };
-    write()
-        .and_then(|()| fs::rename(&temporary, path))
-        .map_err(|e| {
-            // The first error is the one to tell.
-            let _ = fs::remove_file(&temporary);
-            io_error(path, &e)
-        })
-}
-
-trait WriteSeek: Write + Seek {}
-impl<T: Write + Seek> WriteSeek for T {}

@@ -356,8 +356,9 @@ impl Instance {
         self.start = state.start;
         self.stop = state.stop;
         self.parameters.clone_from(&state.parameters);
+        // The snapshot has them too.
         self.inputs.clone_from(&state.inputs);
-        self.changed.fill(true);
+        self.changed.fill(false);
         self.reader = Reader::new();
         Ok(())
     }

@@ -7,7 +7,7 @@ use xxhash_rust::xxh3::xxh3_128;
 use super::FmiVersion;
 use crate::error::{Code, Error, Result};
 use crate::output::variables::{self, OutputVariable, element_name, name_part};
-use crate::scene::{Neighbours, Scene, StateMeasures};
+use crate::scene::{Scene, StateMeasures};
 use crate::simulation::Simulation;
 
 /// Most scalars into which arrays are taken apart for FMI 2.0: importers parse scalars slowly.
@@ -163,14 +163,7 @@ fn parameters(scene: &Scene) -> Result<Vec<Parameter>> {
     // The scene has either a fixed step or a CFL number.
     match numerics.time_step {
         Some(step) => number("time_step", "s", "Fixed time step", step),
-        None => {
-            let default = if numerics.neighbours == Neighbours::Lattice(6) {
-                0.6
-            } else {
-                0.9
-            };
-            number("cfl", "1", "CFL number", numerics.cfl.unwrap_or(default));
-        }
+        None => number("cfl", "1", "CFL number", numerics.cfl_number()),
     }
     number(
         "smoothing_factor",
