@@ -57,9 +57,7 @@ pub use fields::{Configuration, FIELDS, Field, FieldInfo};
 pub use ledger::{Energies, Momenta, Resultant};
 pub use plan::Plan;
 pub use scene::Scene;
-pub use simulation::{
-    Control, Input, Patch, ProbeMotion, Progress, Quantity, Simulation, View,
-};
+pub use simulation::{Control, Input, Patch, ProbeMotion, Progress, Quantity, Simulation, View};
 pub use snapshot::Snapshot;
 
 /// Version of the library, the header and the FMU.
