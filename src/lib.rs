@@ -34,7 +34,12 @@
 
 mod boundary;
 pub mod error;
+pub mod ffi;
 pub mod fields;
+#[cfg(feature = "fmi")]
+#[allow(unsafe_code)] // The C functions of FMI.
+#[path = "../fmu/mod.rs"]
+pub mod fmu;
 mod formulation;
 mod integrator;
 mod kernel;
@@ -44,6 +49,7 @@ pub mod ledger;
 mod material;
 mod math;
 mod neighbours;
+pub mod output;
 mod parallel;
 mod particles;
 mod plan;

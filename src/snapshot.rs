@@ -36,6 +36,11 @@ pub(crate) fn scene_hash(scene: &Scene) -> u64 {
 trait Walk {
     fn word(&mut self, value: &mut u64) -> Result<()>;
     fn numbers(&mut self, values: &mut [f64]) -> Result<()>;
+    /// How many items follow, of at least eight bytes each.
+    fn length(&mut self, present: usize) -> Result<usize> {
+        self.word(&mut (present as u64))?;
+        Ok(present)
+    }
 
     fn number(&mut self, value: &mut f64) -> Result<()> {
         self.numbers(std::slice::from_mut(value))
@@ -82,13 +87,11 @@ impl Snapshot {
         ] {
             walk.number(value)?;
         }
-        let mut inputs = self.inputs.len() as u64;
-        walk.word(&mut inputs)?;
-        self.inputs.resize_with(checked_length(inputs)?, Vec::new);
+        let inputs = walk.length(self.inputs.len())?;
+        self.inputs.resize_with(inputs, Vec::new);
         for values in &mut self.inputs {
-            let mut length = values.len() as u64;
-            walk.word(&mut length)?;
-            values.resize(checked_length(length)?, 0.0);
+            let length = walk.length(values.len())?;
+            values.resize(length, 0.0);
             walk.numbers(values)?;
         }
         let layout = self.state.x.layout();
@@ -202,15 +205,6 @@ fn damaged(what: &str) -> Error {
     )
 }
 
-/// Lengths come before their data: a damaged one must not ask for all the memory there is.
-fn checked_length(length: u64) -> Result<usize> {
-    if length <= 1 << 32 {
-        Ok(length as usize)
-    } else {
-        Err(damaged("a length in it is absurd"))
-    }
-}
-
 struct Writer(Vec<u8>);
 
 impl Walk for Writer {
@@ -259,6 +253,15 @@ impl Walk for Reader<'_> {
     fn word(&mut self, value: &mut u64) -> Result<()> {
         *value = u64::from_le_bytes(self.take(8)?.try_into().expect("eight bytes"));
         Ok(())
+    }
+    /// Lengths come before their data: a damaged one must not ask for all the memory there is.
+    fn length(&mut self, _: usize) -> Result<usize> {
+        let mut length = 0;
+        self.word(&mut length)?;
+        usize::try_from(length)
+            .ok()
+            .filter(|&n| n <= self.0.len() / 8)
+            .ok_or_else(|| damaged("a length in it is absurd"))
     }
     fn numbers(&mut self, values: &mut [f64]) -> Result<()> {
         let bytes = self.take(8 * values.len())?;
