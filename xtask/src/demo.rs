@@ -12,8 +12,7 @@ const SCENE: &str = "examples/demo/scene.json";
 
 pub fn demo(sh: &Shell) -> Result<()> {
     let python = venv::python(sh)?;
-    cmd!(sh, "cargo build --release --package urlsph --features cli").run()?;
-    let urlsph = project::target().join("release").join("urlsph");
+    let urlsph = project::build(sh)?.join("urlsph");
     let out = project::target().join("demo");
     let start = Instant::now();
     sh.remove_path(&out)?;

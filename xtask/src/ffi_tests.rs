@@ -87,6 +87,7 @@ impl Setup {
     /// What is installed, and what pkg-config says about it.
     fn check_installation(&self, sh: &Shell) -> Result<()> {
         for file in [
+            "bin/urlsph",
             "include/urlsph.h",
             "include/urlsph.hpp",
             "lib/liburlsph.a",

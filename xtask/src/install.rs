@@ -1,5 +1,5 @@
-//! `cargo xtask install --prefix DIR [--destdir DIR]`: the library as C and C++ projects expect it,
-//! with pkg-config and CMake files that may be moved together with the prefix.
+//! `cargo xtask install --prefix DIR [--destdir DIR]`: the command line, and the library as C and C++
+//! projects expect it, with pkg-config and CMake files that may be moved together with the prefix.
 
 use std::path::{Path, PathBuf};
 
@@ -77,15 +77,15 @@ pub fn install(sh: &Shell, arguments: &[&str]) -> Result<()> {
 /// Builds the library in release and installs it under `prefix`.
 fn install_to(sh: &Shell, prefix: &Path) -> Result<()> {
     let shared = SharedLibrary::of_this_platform()?;
-    cmd!(sh, "cargo build --release --package urlsph --lib").run()?;
-    let built = project::target().join("release");
+    let built = project::build(sh)?;
 
+    let bin = prefix.join("bin");
     let include = prefix.join("include");
     let lib = prefix.join("lib");
     let pkgconfig = lib.join("pkgconfig");
     let cmake = lib.join("cmake").join("urlsph");
     let licences = prefix.join("share").join("licenses").join("urlsph");
-    for folder in [&include, &lib, &pkgconfig, &cmake, &licences] {
+    for folder in [&bin, &include, &lib, &pkgconfig, &cmake, &licences] {
         sh.create_dir(folder)?;
     }
 
@@ -97,6 +97,8 @@ fn install_to(sh: &Shell, prefix: &Path) -> Result<()> {
     }
     sh.copy_file(built.join("liburlsph.a"), &lib)?;
     // A running program may have the old file mapped: replace it instead of writing into it.
+    sh.remove_path(bin.join("urlsph"))?;
+    sh.copy_file(built.join("urlsph"), &bin)?;
     sh.remove_path(lib.join(&shared.full))?;
     sh.copy_file(built.join(&shared.plain), lib.join(&shared.full))?;
     link(sh, &shared.full, &lib.join(&shared.soname))?;

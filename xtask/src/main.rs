@@ -24,10 +24,11 @@ Tasks:
               fields, histories and pictures under target/demo/
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
   header      Generate include/urlsph.h; with --check only see whether it is up to date
-  install     --prefix DIR [--destdir DIR]: library, headers, pkg-config and CMake files
+  install     --prefix DIR [--destdir DIR]: command line, library, headers, pkg-config and CMake
+              files
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
-  wheel       The Python package with the library inside, in target/wheel/
   validate    The long comparisons with reference solutions, with residuals and tolerances
+  wheel       The Python package with the library inside, in target/wheel/
 ";
 
 fn main() -> ExitCode {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use xshell::Shell;
+use xshell::{Shell, cmd};
 
 /// The repository's root.
 pub fn root() -> &'static Path {
@@ -22,4 +22,13 @@ pub fn shell() -> Result<Shell> {
     let sh = Shell::new()?;
     sh.change_dir(root());
     Ok(sh)
+}
+
+/// Builds the library and the command line in release; the folder where they are.
+///
+/// Installation, demo and tests share this one build: the feature `cli` adds a program and leaves
+/// the library as it is, but to Cargo every set of features is a library of its own.
+pub fn build(sh: &Shell) -> Result<PathBuf> {
+    cmd!(sh, "cargo build --release --package urlsph --features cli").run()?;
+    Ok(target().join("release"))
 }

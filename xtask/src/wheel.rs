@@ -13,7 +13,7 @@ const SOURCES: &str = "include/python";
 /// Builds the wheel; its path.
 pub fn wheel(sh: &Shell) -> Result<PathBuf> {
     let python = venv::python(sh)?;
-    cmd!(sh, "cargo build --release --package urlsph --lib").run()?;
+    let built = project::build(sh)?;
     let folder = project::target().join("wheel");
     // A copy, so that neither the library nor what setuptools leaves behind gets into the sources.
     let stage = folder.join("stage");
@@ -31,7 +31,7 @@ pub fn wheel(sh: &Shell) -> Result<PathBuf> {
             sh.copy_file(file, &package)?;
         }
     }
-    sh.copy_file(project::target().join("release").join(library()), &package)?;
+    sh.copy_file(built.join(library()), &package)?;
     cmd!(
         sh,
         "{python} -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir {folder} {stage}"
