@@ -1,6 +1,7 @@
 //! The project's tasks: `cargo xtask <task>`.
 
 mod demo;
+mod fmu_tests;
 mod header;
 mod install;
 mod output_tests;

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::fmu_tests::fmu_tests;
 use crate::output_tests::output_tests;
 use crate::tally::Tally;
 
@@ -18,6 +19,7 @@ const PARTS: &[Part] = &[
     ("documentation", documentation),
     ("rust", rust),
     ("output files", output_tests),
+    ("fmu", fmu_tests),
 ];
 
 pub fn test(sh: &Shell) -> Result<()> {
