@@ -176,7 +176,9 @@ pub fn find_library() -> Result<PathBuf> {
 fn read_library(path: &Path) -> Result<Vec<u8>> {
     let bytes = std::fs::read(path)
         .map_err(|e| Error::new(Code::Io, format!("cannot read `{}`: {e}", path.display())))?;
-    let found = bytes.windows(MARK.len()).any(|window| window == MARK.as_bytes());
+    let found = bytes
+        .windows(MARK.len())
+        .any(|window| window == MARK.as_bytes());
     if found {
         Ok(bytes)
     } else {

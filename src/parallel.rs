@@ -85,15 +85,31 @@ pub fn map_slabs<I: Send, R: Send>(
     slabs: Vec<I>,
     work: impl Fn(usize, I) -> R + Sync + Send,
 ) -> Vec<R> {
-    slabs.into_par_iter().enumerate().map(|(i, slab)| work(i, slab)).collect()
+    slabs
+        .into_par_iter()
+        .enumerate()
+        .map(|(i, slab)| work(i, slab))
+        .collect()
 }
 
 /// Fills a vector from its index, in parallel.
 pub fn fill<R: Send>(count: usize, value: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
-    (0..count).into_par_iter().with_min_len(256).map(value).collect()
+    (0..count)
+        .into_par_iter()
+        .with_min_len(256)
+        .map(value)
+        .collect()
 }
 
 /// Calls `work(row, values)` for all rows of a row-major table.
-pub fn for_each_row(table: &mut [f64], columns: usize, work: impl Fn(usize, &mut [f64]) + Sync + Send) {
-    table.par_chunks_exact_mut(columns).with_min_len(256).enumerate().for_each(|(i, row)| work(i, row));
+pub fn for_each_row(
+    table: &mut [f64],
+    columns: usize,
+    work: impl Fn(usize, &mut [f64]) + Sync + Send,
+) {
+    table
+        .par_chunks_exact_mut(columns)
+        .with_min_len(256)
+        .enumerate()
+        .for_each(|(i, row)| work(i, row));
 }

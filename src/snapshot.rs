@@ -52,7 +52,11 @@ trait Walk {
         }
         Ok(())
     }
-    fn optional<const N: usize>(&mut self, array: &mut Option<Array<N>>, layout: Layout) -> Result<()> {
+    fn optional<const N: usize>(
+        &mut self,
+        array: &mut Option<Array<N>>,
+        layout: Layout,
+    ) -> Result<()> {
         let mut present = u64::from(array.is_some());
         self.word(&mut present)?;
         match present {
@@ -75,7 +79,12 @@ impl Snapshot {
         walk.number(&mut self.time)?;
         walk.word(&mut self.steps)?;
         let a = &mut self.accounts;
-        for value in [&mut a.initial, &mut a.external_work, &mut a.dissipation, &mut a.projection] {
+        for value in [
+            &mut a.initial,
+            &mut a.external_work,
+            &mut a.dissipation,
+            &mut a.projection,
+        ] {
             walk.number(value)?;
         }
         let inputs = walk.length(self.inputs.len())?;
@@ -113,8 +122,12 @@ impl Snapshot {
         let mut writer = Writer(Vec::new());
         writer.0.extend_from_slice(MAGIC);
         writer.0.extend_from_slice(&FORMAT.to_le_bytes());
-        writer.0.extend_from_slice(&(self.state.x.particles() as u32).to_le_bytes());
-        self.clone().walk(&mut writer).expect("writing to memory does not fail");
+        writer
+            .0
+            .extend_from_slice(&(self.state.x.particles() as u32).to_le_bytes());
+        self.clone()
+            .walk(&mut writer)
+            .expect("writing to memory does not fail");
         let sum = xxh3_64(&writer.0);
         writer.0.extend_from_slice(&sum.to_le_bytes());
         writer.0
@@ -129,7 +142,8 @@ impl Snapshot {
         if bytes.len() < HEAD + 8 || &bytes[..8] != MAGIC {
             return Err(damaged("it does not start like one"));
         }
-        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+        let word =
+            |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
         if word(8) != FORMAT {
             return Err(Error::new(
                 Code::Snapshot,
@@ -167,13 +181,19 @@ impl Snapshot {
         };
         let mut reader = Reader(&body[HEAD..]);
         snapshot.walk(&mut reader)?;
-        if reader.0.is_empty() { Ok(snapshot) } else { Err(damaged("it is too long")) }
+        if reader.0.is_empty() {
+            Ok(snapshot)
+        } else {
+            Err(damaged("it is too long"))
+        }
     }
 
     /// Hash of the content.
     pub fn hash(&self) -> u64 {
         let mut hasher = Hasher(Xxh3::new());
-        self.clone().walk(&mut hasher).expect("hashing does not fail");
+        self.clone()
+            .walk(&mut hasher)
+            .expect("hashing does not fail");
         hasher.0.digest()
     }
 }
@@ -220,8 +240,10 @@ struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
     fn take(&mut self, length: usize) -> Result<&[u8]> {
-        let (head, rest) =
-            self.0.split_at_checked(length).ok_or_else(|| damaged("it ends too early"))?;
+        let (head, rest) = self
+            .0
+            .split_at_checked(length)
+            .ok_or_else(|| damaged("it ends too early"))?;
         self.0 = rest;
         Ok(head)
     }

@@ -9,7 +9,8 @@ use std::ptr;
 
 use crate::error::{Error, Result};
 
-fn check<T>(pointer: *const T, name: &str) -> Result<()> {
+/// NULL and alignment.
+pub(super) fn check<T>(pointer: *const T, name: &str) -> Result<()> {
     if pointer.is_null() {
         return Err(Error::argument(format!("`{name}` is NULL")));
     }

@@ -1,6 +1,6 @@
 //! Inputs and time.
 
-use super::args::{array, buffer, put};
+use super::args::{array, buffer, check, put};
 use super::handle::{Session, with};
 use super::query::{patch_at, quantity_at};
 use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
@@ -103,6 +103,8 @@ pub unsafe extern "C" fn urlsph_read_input(
         let simulation = session.simulation()?;
         patch_at(simulation, patch)?;
         let present = simulation.input(patch, quantity_at(quantity)?)?;
+        // Both outputs or none.
+        check(count, "count")?;
         // SAFETY: the caller's pointers, as the header's preamble demands.
         unsafe {
             buffer(values, capacity, present.len(), "values")?.copy_from_slice(present);

@@ -1,6 +1,6 @@
 //! The complete state: snapshot, restore, hash.
 
-use super::args::{array, buffer, put};
+use super::args::{array, buffer, check, put};
 use super::handle::with;
 use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
 use crate::snapshot::Snapshot;
@@ -39,6 +39,8 @@ pub unsafe extern "C" fn urlsph_save_snapshot(
 ) -> urlsph_status {
     with(simulation, |session| {
         let bytes = session.snapshot()?;
+        // Both outputs or none.
+        check(size, "size")?;
         // SAFETY: the caller's pointers, as the header's preamble demands.
         unsafe {
             self::buffer(buffer, capacity, bytes.len(), "buffer")?.copy_from_slice(bytes);

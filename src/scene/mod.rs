@@ -254,7 +254,12 @@ impl Default for Numerics {
 impl Numerics {
     /// The CFL number: the scene's, or the largest that is proven stable for its neighbours.
     pub fn cfl_number(&self) -> f64 {
-        self.cfl.unwrap_or(if self.neighbours == Neighbours::Lattice(6) { 0.6 } else { 0.9 })
+        self.cfl
+            .unwrap_or(if self.neighbours == Neighbours::Lattice(6) {
+                0.6
+            } else {
+                0.9
+            })
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod demo;
 mod ffi_tests;
+mod fmu_tests;
 mod header;
 mod install;
 mod output_tests;

@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
 use crate::ffi_tests::ffi_tests;
+use crate::fmu_tests::fmu_tests;
 use crate::output_tests::output_tests;
 use crate::tally::Tally;
 
@@ -20,6 +21,7 @@ const PARTS: &[Part] = &[
     ("rust", rust),
     ("output files", output_tests),
     ("C, C++, Python", ffi_tests),
+    ("fmu", fmu_tests),
 ];
 
 pub fn test(sh: &Shell) -> Result<()> {
