@@ -450,8 +450,13 @@ impl Simulation {
         })
     }
 
-    /// Rates of the present state.
-    fn evaluate(&mut self) -> Result<()> {
+    /// Evaluates the right-hand side at the present state once more. It changes nothing: this is
+    /// what the benches time.
+    ///
+    /// # Errors
+    /// None for a state that a step has left.
+    #[doc(hidden)]
+    pub fn evaluate(&mut self) -> Result<()> {
         let Self {
             pool,
             url,
@@ -819,7 +824,7 @@ fn is_stale(numerics: &Numerics, steps: u64) -> bool {
     match numerics.reference_update {
         ReferenceUpdate::Never => false,
         ReferenceUpdate::EveryStep => true,
-        ReferenceUpdate::Every(n) => steps % u64::from(n) == 0,
+        ReferenceUpdate::Every(n) => steps.is_multiple_of(u64::from(n)),
     }
 }
 
