@@ -344,6 +344,8 @@ def test_busy_from_another_thread(column):
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a POSIX signal")
 def test_ctrl_c_ends_a_step(column):
+    # A job that a shell has put into the background inherits that Ctrl-C is ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     running = threading.Event()
     column.set_callbacks(progress=lambda _: running.set())
 

@@ -17,6 +17,7 @@ type Part = (&'static str, fn(&Shell) -> Result<Tally>);
 const PARTS: &[Part] = &[
     ("format", format),
     ("lints", lints),
+    ("no features", no_features),
     ("documentation", documentation),
     ("rust", rust),
     ("output files", output_tests),
@@ -62,6 +63,18 @@ fn lints(sh: &Shell) -> Result<Tally> {
         cmd!(
             sh,
             "cargo clippy --release --workspace --all-features --all-targets -- {strict}"
+        )
+        .run(),
+    ))
+}
+
+/// The library that an embedding program pays for compiles without the FMU and the command line.
+fn no_features(sh: &Shell) -> Result<Tally> {
+    let strict = "-Dwarnings";
+    Ok(Tally::of(
+        cmd!(
+            sh,
+            "cargo clippy --release --package urlsph --lib --no-default-features -- {strict}"
         )
         .run(),
     ))
