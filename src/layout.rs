@@ -50,7 +50,11 @@ impl Layout {
     /// components of a particle to the same cache set.
     fn stride(&self) -> usize {
         let stride = self.slices + 2;
-        if stride % 64 == 0 { stride + 1 } else { stride }
+        if stride.is_multiple_of(64) {
+            stride + 1
+        } else {
+            stride
+        }
     }
 }
 
