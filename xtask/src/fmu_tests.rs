@@ -8,9 +8,7 @@ use crate::{project, venv};
 
 pub fn fmu_tests(sh: &Shell) -> Result<Tally> {
     let python = venv::python(sh)?;
-    // What the Rust tests have built already.
-    cmd!(sh, "cargo build --release --workspace --all-features").run()?;
-    let urlsph = project::target().join("release").join("urlsph");
+    let urlsph = project::build(sh)?.join("urlsph");
     Tally::run(
         cmd!(
             sh,
