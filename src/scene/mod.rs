@@ -447,9 +447,9 @@ impl Scene {
     /// is not in the JSON yet.
     ///
     /// # Errors
-    /// [`Code::Parse`](crate::Code::Parse) or [`Code::InvalidScene`](crate::Code::InvalidScene), with the JSON path;
-    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) for an override that has no place in the JSON;
-    /// [`Code::OutOfMemory`](crate::Code::OutOfMemory) for more particles than this machine can hold.
+    /// [`Code::Parse`] or [`Code::InvalidScene`], with the JSON path;
+    /// [`Code::InvalidArgument`] for an override that has no place in the JSON;
+    /// [`Code::OutOfMemory`] for more particles than this machine can hold.
     pub fn from_json(text: &str, overrides: &[String]) -> Result<Self> {
         let scene = parse::parse(text, overrides)?;
         scene
@@ -461,7 +461,7 @@ impl Scene {
     /// Reads, parses and validates a scene file; see [`from_json`](Self::from_json).
     ///
     /// # Errors
-    /// [`Code::Io`](crate::Code::Io) if the file cannot be read, otherwise as [`from_json`](Self::from_json);
+    /// [`Code::Io`] if the file cannot be read, otherwise as [`from_json`](Self::from_json);
     /// the message names the file.
     pub fn from_file(path: impl AsRef<Path>, overrides: &[String]) -> Result<Self> {
         /// Far more than the parameters of any body; a device or a wrong file stops here.

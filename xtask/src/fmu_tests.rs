@@ -12,7 +12,7 @@ pub fn fmu_tests(sh: &Shell) -> Result<Tally> {
     Tally::run(
         cmd!(
             sh,
-            "{python} -m pytest -q -p no:cacheprovider ffi-tests/python_fmi"
+            "{python} -B -m pytest -q -p no:cacheprovider ffi-tests/python_fmi"
         )
         .env("URLSPH", urlsph),
     )
