@@ -594,10 +594,15 @@ impl Simulation {
     pub fn set_input(&mut self, patch: usize, quantity: Quantity, values: &[f64]) -> Result<()> {
         let index = self.boundary.input_index(patch, quantity)?;
         self.boundary.check_input(index, values)?;
-        self.inputs[index].clear();
-        self.inputs[index].extend_from_slice(values);
+        let old = std::mem::replace(&mut self.inputs[index], values.to_vec());
+        match self.compute_resultants() {
+            Ok(resultants) => self.resultants = resultants,
+            Err(error) => {
+                self.inputs[index] = old;
+                return Err(error);
+            }
+        }
         self.generation += 1;
-        self.resultants = self.compute_resultants()?;
         Ok(())
     }
 
@@ -722,11 +727,12 @@ impl Simulation {
             && snapshot.state.h.is_some() == self.state.h.is_some()
             && snapshot.state.j.is_some() == self.state.j.is_some()
             && snapshot.updated.is_some() == self.reference.updated.is_some()
-            && snapshot.inputs.len() == self.inputs.len();
+            && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.time.is_finite();
         if !same_shape {
             return Err(Error::new(
                 Code::Snapshot,
-                "the snapshot lacks fields of its scene: it is damaged",
+                "the snapshot does not have the fields of its scene: it is damaged",
             ));
         }
         let now = self.snapshot();
