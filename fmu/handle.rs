@@ -1,8 +1,6 @@
 //! What an importer holds: a pointer to an instance, and the guard around every call through it.
 
-use std::any::Any;
 use std::ffi::{CStr, CString, c_char, c_void};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,6 +9,7 @@ use super::FmiVersion;
 use super::instance::Instance;
 use super::state::State;
 use crate::error::{Code, Error, Result};
+use crate::ffi::panic::catch;
 
 /// Status of a call; the same numbers in both standards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,7 +120,7 @@ pub(super) unsafe fn instantiate(arguments: Arguments, refusal: Option<&str>) ->
     // SAFETY: by the caller's promise.
     let resources = unsafe { optional_text(arguments.resources) };
     let logger = arguments.logger;
-    let made = catch_unwind(AssertUnwindSafe(|| {
+    let made = catch(|| {
         if let Some(refusal) = refusal {
             return Err(Error::argument(refusal));
         }
@@ -130,8 +129,8 @@ pub(super) unsafe fn instantiate(arguments: Arguments, refusal: Option<&str>) ->
         })?;
         let scene = read_scene(resources.as_deref())?;
         Instance::new(arguments.version, scene, &token)
-    }));
-    let made = made.unwrap_or_else(|panic| Err(internal(&*panic)));
+    });
+    let made = made.unwrap_or_else(|panic| Err(internal(&panic)));
     match made {
         Ok(instance) => {
             let handle = Handle {
@@ -163,10 +162,10 @@ pub(super) unsafe fn free(pointer: *mut c_void, version: FmiVersion) {
     };
     handle.event("freed");
     // Joins the threads of the simulation. A panic must not reach the importer.
-    let _ = catch_unwind(AssertUnwindSafe(|| {
+    let _ = catch(|| {
         // SAFETY: made by `Box::into_raw` in `instantiate`, and freed once.
         drop(unsafe { Box::from_raw(pointer.cast::<Handle>()) });
-    }));
+    });
 }
 
 /// Calls through a handle: one at a time, no panic gets out, failures are logged.
@@ -194,7 +193,7 @@ pub(super) unsafe fn call(
                 Status::Fatal,
                 "the instance is lost after an internal error: free it".to_owned(),
             )),
-            Some(instance) => match catch_unwind(AssertUnwindSafe(|| body(instance))) {
+            Some(instance) => match catch(|| body(instance)) {
                 Ok(Ok(())) => Ok(()),
                 Ok(Err(error)) if error.code() != Code::Internal => {
                     Err((Status::Error, error.to_string()))
@@ -205,7 +204,7 @@ pub(super) unsafe fn call(
                 }
                 Err(panic) => {
                     *slot = None;
-                    Err((Status::Fatal, internal(&*panic).to_string()))
+                    Err((Status::Fatal, internal(&panic).to_string()))
                 }
             },
         },
@@ -489,15 +488,10 @@ unsafe fn get<'a>(pointer: *mut c_void, version: FmiVersion) -> Option<&'a Handl
     (handle.version == version).then_some(handle)
 }
 
-fn internal(panic: &(dyn Any + Send)) -> Error {
-    let text = panic
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("unknown");
+fn internal(panic: &str) -> Error {
     Error::new(
         Code::Internal,
-        format!("internal error, please report it with the scene: {text}"),
+        format!("internal error, please report it with the scene: {panic}"),
     )
 }
 

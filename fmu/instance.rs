@@ -434,21 +434,20 @@ impl Instance {
         if expected == length {
             return Ok(());
         }
-        let names: Vec<_> = references
-            .iter()
-            .take(3)
-            .filter_map(|&r| self.table.find(r))
-            .map(|(v, _)| self.table.variables[v].name.as_str())
-            .collect();
-        Err(Error::argument(format!(
-            "{length} values are given, but {}{} {expected}",
-            names.join(", "),
-            if references.len() > 3 {
-                " and so on have"
-            } else {
-                " have"
-            },
-        )))
+        let what = match references {
+            [one] => self
+                .table
+                .find(*one)
+                .map(|(v, _)| &self.table.variables[v].name),
+            _ => None,
+        };
+        Err(Error::argument(match what {
+            Some(name) => format!("{name} has {expected} values, but {length} are given"),
+            None => format!(
+                "the {} variables have {expected} values together, but {length} are given",
+                references.len()
+            ),
+        }))
     }
 
     /// Brings the simulation up to date with parameters and inputs.

@@ -1,7 +1,7 @@
 //! A scene as a co-simulation FMU, for FMI 2.0 and FMI 3.0.
 //!
-//! One core serves both standards: [`table`] lists the variables of a scene, [`instance`] is the
-//! state machine around a [`Simulation`](crate::Simulation), and [`fmi2`] and [`fmi3`] are the C
+//! One core serves both standards: `table` lists the variables of a scene, `instance` is the
+//! state machine around a [`Simulation`](crate::Simulation), and `fmi2` and `fmi3` are the C
 //! functions of the standards, in the same shared library as the C ABI. [`package`] writes the
 //! archive.
 //!
@@ -10,7 +10,7 @@
 //! FMI 3.0 has arrays: values per particle are one variable. FMI 2.0 has scalars only, so vectors
 //! appear as `boundary.top.traction[1]`, and arrays only in small numbers: the inputs per particle,
 //! and the arrays of the patches that have them, if they are at most
-//! [`MAX_SCALARS`](table::MAX_SCALARS) scalars in all; otherwise such an input is one value for the
+//! 1000 scalars in all; otherwise such an input is one value for the
 //! patch. Fields of the whole body are in FMI 3.0 alone.
 //!
 //! # Time

@@ -221,7 +221,18 @@ impl Simulation {
         this.evaluate()?;
         this.accounts.initial = this.evaluation.kinetic + this.evaluation.strain;
         this.resultants = this.compute_resultants()?;
+        // A load that has no finite value at the start is an error of the scene, not of its first step.
+        this.nodal_forces()?;
         Ok(this)
+    }
+
+    fn nodal_forces(&self) -> Result<Array<3>> {
+        let now = (self.time, self.stable_step());
+        let (url, state) = (&self.url, &self.state);
+        self.pool.install(|| {
+            self.boundary
+                .nodal_forces(url, state, &self.reference, now, &self.inputs)
+        })
     }
 
     /// The scene.
@@ -583,10 +594,15 @@ impl Simulation {
     pub fn set_input(&mut self, patch: usize, quantity: Quantity, values: &[f64]) -> Result<()> {
         let index = self.boundary.input_index(patch, quantity)?;
         self.boundary.check_input(index, values)?;
-        self.inputs[index].clear();
-        self.inputs[index].extend_from_slice(values);
+        let old = std::mem::replace(&mut self.inputs[index], values.to_vec());
+        match self.compute_resultants() {
+            Ok(resultants) => self.resultants = resultants,
+            Err(error) => {
+                self.inputs[index] = old;
+                return Err(error);
+            }
+        }
         self.generation += 1;
-        self.resultants = self.compute_resultants()?;
         Ok(())
     }
 
@@ -613,27 +629,17 @@ impl Simulation {
             ))
             .at_field(field.info().name));
         }
+        let force = match field {
+            Field::NodalForce => Some(self.nodal_forces()?),
+            _ => None,
+        };
         self.pool.install(|| {
-            let force = match field {
-                Field::NodalForce => {
-                    let now = (self.time, self.stable_step());
-                    let (url, state) = (&self.url, &self.state);
-                    Some(self.boundary.nodal_forces(
-                        url,
-                        state,
-                        &self.reference,
-                        now,
-                        &self.inputs,
-                    )?)
-                }
-                _ => None,
-            };
             parallel::for_each_row(out, n, |caller, row| {
                 let slot = Layout::slot(self.rank[caller] as usize);
                 row.copy_from_slice(&self.field_at(field, slot, force.as_ref())[..n]);
             });
-            Ok(())
-        })
+        });
+        Ok(())
     }
 
     /// Value of a field at a slot; unused components are 0.
@@ -721,11 +727,12 @@ impl Simulation {
             && snapshot.state.h.is_some() == self.state.h.is_some()
             && snapshot.state.j.is_some() == self.state.j.is_some()
             && snapshot.updated.is_some() == self.reference.updated.is_some()
-            && snapshot.inputs.len() == self.inputs.len();
+            && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.time.is_finite();
         if !same_shape {
             return Err(Error::new(
                 Code::Snapshot,
-                "the snapshot lacks fields of its scene: it is damaged",
+                "the snapshot does not have the fields of its scene: it is damaged",
             ));
         }
         let now = self.snapshot();

@@ -3,12 +3,17 @@
 import shutil
 
 import numpy as np
+import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
 OK, ERROR = 0, 3
+
+# Of a test that is about one version of FMI, or about both at once.
+only_fmi2 = pytest.mark.parametrize("version", [2], ids=["fmi2"])
+only_fmi3 = pytest.mark.parametrize("version", [3], ids=["fmi3"])
 
 
 class Driver:

@@ -14,6 +14,7 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from conftest import SCENES
+from driver import only_fmi3
 from functions import FMI2, FMI3
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
@@ -130,6 +131,7 @@ def test_quoted_names(export, version):
     assert "numerics.time_step" in names and "numerics.cfl" not in names
 
 
+@only_fmi3
 def test_arrays_as_scalars_only_in_small_numbers(start):
     few = start("per_particle", initialize=False, fmi=2)
     assert few.shape("boundary.top.traction") == (25, 3)
@@ -142,6 +144,7 @@ def test_arrays_as_scalars_only_in_small_numbers(start):
     assert native.shape("boundary.top.traction") == (169, 3)
 
 
+@only_fmi3
 def test_tensors_are_3_by_3(start):
     instance = start("mooney", fmi=3)
     shape = instance.shape("field.deformation_gradient")

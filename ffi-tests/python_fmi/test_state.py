@@ -1,9 +1,11 @@
 """The state of the FMU: rollback, copies, bytes."""
 
+from ctypes import byref, c_void_p
+
 import numpy as np
 import pytest
 
-from driver import ERROR, Driver, status
+from driver import ERROR, status
 
 SCENES = ["column", "per_particle", "mooney", "driven"]
 
@@ -73,7 +75,6 @@ def test_a_state_object_is_used_again(start):
     instance = start()
     state = instance.get_state()
     instance.step(0.001)
-    from ctypes import byref, c_void_p
     place = c_void_p(state.value)
     getter = instance.fmu.fmi2GetFMUstate if instance.version == 2 else instance.fmu.fmi3GetFMUState
     getter(instance.fmu.component, byref(place))
@@ -123,7 +124,6 @@ def test_states_of_another_fmu_are_refused(start):
 
 
 def test_null_states(start):
-    from ctypes import c_void_p
     instance = start()
     assert status(instance.set_state, c_void_p()) == ERROR
     assert status(instance.serialize, c_void_p()) == ERROR

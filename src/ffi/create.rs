@@ -1,7 +1,6 @@
 //! Version; creation, errors, callbacks, destruction.
 
 use std::ffi::{CStr, c_char};
-use std::io::Read;
 use std::ptr;
 
 use super::args::{array, get_struct, put, put_struct, text};
@@ -11,7 +10,7 @@ use super::types::{
     URLSPH_ABI_VERSION, urlsph_callbacks, urlsph_error, urlsph_options, urlsph_simulation,
     urlsph_status,
 };
-use crate::error::{Code, Error, Result};
+use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 
@@ -79,7 +78,8 @@ pub unsafe extern "C" fn urlsph_create_from_json(
     unsafe {
         create(simulation, error, error_size, || {
             let options = Options::read(options, options_size)?;
-            options.build(text(json, "json")?)
+            let scene = Scene::from_json(text(json, "json")?, &options.overrides)?;
+            Simulation::with_threads(scene, options.threads)
         })
     }
 }
@@ -103,7 +103,8 @@ pub unsafe extern "C" fn urlsph_create_from_file(
     unsafe {
         create(simulation, error, error_size, || {
             let options = Options::read(options, options_size)?;
-            options.build(&read_scene(text(path, "path")?)?)
+            let scene = Scene::from_file(text(path, "path")?, &options.overrides)?;
+            Simulation::with_threads(scene, options.threads)
         })
     }
 }
@@ -138,31 +139,6 @@ impl Options {
         };
         Ok(Self { overrides, threads })
     }
-
-    fn build(&self, json: &str) -> Result<Simulation> {
-        Simulation::with_threads(Scene::from_json(json, &self.overrides)?, self.threads)
-    }
-}
-
-fn read_scene(path: &str) -> Result<String> {
-    /// Far more than the parameters of any body; a device or a wrong file stops here.
-    const MOST: u64 = 64 << 20;
-    let failed =
-        |e: std::io::Error| Error::new(Code::Io, format!("cannot read the scene {path}: {e}"));
-    let mut json = String::new();
-    let read = std::fs::File::open(path)
-        .and_then(|file| file.take(MOST + 1).read_to_string(&mut json))
-        .map_err(failed)?;
-    if read as u64 > MOST {
-        return Err(Error::new(
-            Code::Io,
-            format!(
-                "{path} is larger than {} MiB and cannot be a scene",
-                MOST >> 20
-            ),
-        ));
-    }
-    Ok(json)
 }
 
 unsafe fn create(
@@ -314,6 +290,7 @@ fn fixed<const N: usize>(text: &str) -> [c_char; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Code;
 
     fn read<const N: usize>(array: [c_char; N]) -> String {
         let bytes: Vec<u8> = array

@@ -12,6 +12,7 @@ mod value;
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::io::Read;
 use std::path::Path;
 
 use schemars::JsonSchema;
@@ -463,13 +464,23 @@ impl Scene {
     /// [`Code::Io`] if the file cannot be read, otherwise as [`from_json`](Self::from_json);
     /// the message names the file.
     pub fn from_file(path: impl AsRef<Path>, overrides: &[String]) -> Result<Self> {
+        /// Far more than the parameters of any body; a device or a wrong file stops here.
+        const MOST: u64 = 64 << 20;
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            Error::new(
-                Code::Io,
-                format!("the scene {} cannot be read: {e}", path.display()),
-            )
-        })?;
+        let failed = |why: &dyn std::fmt::Display| {
+            let text = format!("the scene {} cannot be read: {why}", path.display());
+            Error::new(Code::Io, text)
+        };
+        let mut text = String::new();
+        let read = std::fs::File::open(path)
+            .and_then(|file| file.take(MOST + 1).read_to_string(&mut text))
+            .map_err(|e| failed(&e))?;
+        if read as u64 > MOST {
+            return Err(failed(&format_args!(
+                "it is larger than {} MiB",
+                MOST >> 20
+            )));
+        }
         Self::from_json(&text, overrides)
             .map_err(|e| e.with_note(&format!("in {}", path.display())))
     }

@@ -1,0 +1,278 @@
+//! Columns against the references of `examples/*/expected.csv`: probe histories, twist angles,
+//! phase and amplitude.
+
+use urlsph::Simulation;
+
+use crate::support::*;
+
+/// A scalar measured over time, with the column of the reference that it is compared with.
+struct Signal {
+    name: &'static str,
+    measure: fn(&Simulation) -> f64,
+}
+
+/// What is compared, and how well it must agree.
+struct Case {
+    name: &'static str,
+    /// Compared together: the residual is the largest norm of their differences.
+    signals: &'static [Signal],
+    /// End of the comparison with tolerances [s].
+    end: f64,
+    /// Tolerances of M3 and M4, relative to the reference's maximum.
+    tolerances: [f64; 2],
+}
+
+const BENDING: Case = Case {
+    name: "column_bending",
+    signals: &[
+        Signal {
+            name: "probe.top_corner.displacement[1]",
+            measure: |s| displacement(s, "top_corner")[0],
+        },
+        Signal {
+            name: "probe.top_corner.displacement[2]",
+            measure: |s| displacement(s, "top_corner")[1],
+        },
+        Signal {
+            name: "probe.top_corner.displacement[3]",
+            measure: |s| displacement(s, "top_corner")[2],
+        },
+    ],
+    end: 0.6,
+    tolerances: [0.02, 0.007],
+};
+
+const BENDING_CENTRE: Case = Case {
+    name: "column_bending",
+    signals: &[
+        Signal {
+            name: "probe.top_centre.displacement[1]",
+            measure: |s| displacement(s, "top_centre")[0],
+        },
+        Signal {
+            name: "probe.top_centre.displacement[2]",
+            measure: |s| displacement(s, "top_centre")[1],
+        },
+        Signal {
+            name: "probe.top_centre.displacement[3]",
+            measure: |s| displacement(s, "top_centre")[2],
+        },
+    ],
+    end: 0.6,
+    tolerances: [0.02, 0.007],
+};
+
+const TENSION: Case = Case {
+    name: "column_tension",
+    signals: &[Signal {
+        name: "probe.top_centre.displacement[2]",
+        measure: |s| displacement(s, "top_centre")[1],
+    }],
+    end: 0.12,
+    tolerances: [0.02, 0.007],
+};
+
+const TWISTING: Case = Case {
+    name: "column_twisting",
+    signals: &[Signal {
+        name: "angle_deg",
+        measure: top_corner_angle,
+    }],
+    end: 0.1,
+    tolerances: [0.03, 0.01],
+};
+
+/// Angle of the top corner about Y [degrees] in (-180, 180], 0 at the start.
+fn top_corner_angle(simulation: &Simulation) -> f64 {
+    let u = displacement(simulation, "top_corner");
+    let angle = (0.5 + u[0]).atan2(0.5 + u[2]).to_degrees() - 45.0;
+    if angle > -180.0 { angle } else { angle + 360.0 }
+}
+
+/// Signals of one model over time: rows of time and values.
+struct History(Vec<Vec<f64>>);
+
+impl History {
+    fn record(case: &Case, model: Model, end: f64, overrides: &[&str]) -> Self {
+        let mut simulation = column(case.name, model, overrides);
+        let mut rows: Vec<Vec<f64>> = Vec::new();
+        run(&mut simulation, end, |s| {
+            let mut row = vec![s.time()];
+            for (i, signal) in case.signals.iter().enumerate() {
+                let mut value = (signal.measure)(s);
+                if signal.name.starts_with("angle") {
+                    // A step turns the corner by degrees: the nearest branch continues the angle.
+                    let before = rows.last().map_or(0.0, |r| r[i + 1]);
+                    value += 360.0 * ((before - value) / 360.0).round();
+                }
+                row.push(value);
+            }
+            rows.push(row);
+        });
+        Self(rows)
+    }
+
+    /// Largest distance from the reference, relative to the largest value of the reference.
+    fn residual(&self, case: &Case, reference: &Table) -> f64 {
+        let columns: Vec<usize> = case
+            .signals
+            .iter()
+            .map(|s| reference.column(s.name))
+            .collect();
+        let (mut distance, mut scale) = (0.0_f64, 0.0_f64);
+        for row in &self.0 {
+            let expected: Vec<f64> = columns.iter().map(|&c| reference.at(c, row[0])).collect();
+            let difference: Vec<f64> = row[1..].iter().zip(&expected).map(|(a, b)| a - b).collect();
+            distance = distance.max(norm(&difference));
+            scale = scale.max(norm(&expected));
+        }
+        distance / scale
+    }
+
+    /// Extrema of the first signal, alternating maxima and minima of half periods: (time, value).
+    fn extrema(&self) -> Vec<(f64, f64)> {
+        extrema(self.0.iter().map(|row| (row[0], row[1])))
+    }
+}
+
+/// The extremum of every stretch between sign changes, refined by a parabola; a last stretch counts
+/// only if its extremum lies inside.
+fn extrema(samples: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let samples: Vec<_> = samples.filter(|s| s.0 > 0.0).collect();
+    let mut found = Vec::new();
+    for stretch in samples.chunk_by(|a, b| (a.1 > 0.0) == (b.1 > 0.0)) {
+        let sizes = stretch.iter().enumerate();
+        let Some((i, _)) = sizes.max_by(|a, b| a.1.1.abs().total_cmp(&b.1.1.abs())) else {
+            continue;
+        };
+        if i == 0 || i + 1 == stretch.len() {
+            continue;
+        }
+        found.push(parabola(stretch[i - 1], stretch[i], stretch[i + 1]));
+    }
+    found
+}
+
+/// Extremum of the parabola through three points.
+fn parabola(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> (f64, f64) {
+    let left = (b.1 - a.1) / (b.0 - a.0);
+    let right = (c.1 - b.1) / (c.0 - b.0);
+    let curvature = (right - left) / (c.0 - a.0);
+    let time = 0.5 * (a.0 + b.0) - 0.5 * left / curvature;
+    (
+        time,
+        a.1 + left * (time - a.0) + curvature * (time - a.0) * (time - b.0),
+    )
+}
+
+/// M1 to M3 approach the reference; M3 within its tolerance.
+fn converges(case: &Case) {
+    let reference = Table::expected(case.name);
+    let signal = case.signals[0].name;
+    let residuals = [M1, M2, M3].map(|model| {
+        let residual = History::record(case, model, case.end, &[]).residual(case, &reference);
+        println!(
+            "{} {signal} {}: {residual:.3e} of the largest value",
+            case.name, model.0
+        );
+        residual
+    });
+    println!(
+        "{} {signal}: observed order {:.2} (M1 to M2), {:.2} (M2 to M3), {:.2} (M1 to M3)",
+        case.name,
+        order((M1.1, residuals[0]), (M2.1, residuals[1])),
+        order((M2.1, residuals[1]), (M3.1, residuals[2])),
+        order((M1.1, residuals[0]), (M3.1, residuals[2])),
+    );
+    check(
+        &format!("{} {signal} M3", case.name),
+        residuals[2],
+        case.tolerances[0],
+    );
+    assert!(
+        residuals[0] > residuals[1] && residuals[1] > residuals[2],
+        "errors fall with refinement: {residuals:?}"
+    );
+}
+
+fn finest(case: &Case) {
+    let reference = Table::expected(case.name);
+    let residual = History::record(case, M4, case.end, &[]).residual(case, &reference);
+    let what = format!("{} {} M4", case.name, case.signals[0].name);
+    check(&what, residual, case.tolerances[1]);
+}
+
+/// Errors of the times and sizes of the extrema over the whole reference.
+fn phase_and_amplitude(case: &Case, models: &[Model]) {
+    let reference = Table::expected(case.name);
+    let column = reference.column(case.signals[0].name);
+    let expected = extrema(reference.samples(column));
+    println!(
+        "| case | model | extremum | time [s] | reference | value | reference | phase error | amplitude error |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for model in models {
+        let found = History::record(case, *model, reference.end(), &[]).extrema();
+        assert!(!found.is_empty(), "an oscillation");
+        for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            println!(
+                "| {} | {} | {} | {:.4} | {:.4} | {:.4} | {:.4} | {:+.2} % | {:+.2} % |",
+                case.name,
+                model.0,
+                i + 1,
+                found.0,
+                expected.0,
+                found.1,
+                expected.1,
+                100.0 * (found.0 / expected.0 - 1.0),
+                100.0 * (found.1 / expected.1 - 1.0),
+            );
+        }
+    }
+}
+
+#[test]
+fn bending_corner_converges_to_the_reference() {
+    converges(&BENDING);
+}
+
+#[test]
+fn bending_centre_converges_to_the_reference() {
+    converges(&BENDING_CENTRE);
+}
+
+#[test]
+fn tension_converges_to_the_reference() {
+    converges(&TENSION);
+}
+
+#[test]
+fn twist_angle_converges_to_the_reference() {
+    converges(&TWISTING);
+}
+
+#[test]
+#[ignore = "28,000 particles: cargo xtask validate"]
+fn bending_of_the_finest_model() {
+    finest(&BENDING);
+}
+
+#[test]
+#[ignore = "28,000 particles: cargo xtask validate"]
+fn tension_of_the_finest_model() {
+    finest(&TENSION);
+}
+
+#[test]
+#[ignore = "28,000 particles: cargo xtask validate"]
+fn twisting_of_the_finest_model() {
+    finest(&TWISTING);
+}
+
+#[test]
+#[ignore = "full histories: cargo xtask validate"]
+fn phase_and_amplitude_over_the_full_histories() {
+    for case in [&BENDING, &TENSION, &TWISTING] {
+        phase_and_amplitude(case, &[M1, M2, M3]);
+    }
+}

@@ -1,0 +1,166 @@
+//! What the acceptance tests share: scenes of the examples, runs step by step, reference tables.
+
+use std::path::PathBuf;
+
+use urlsph::{Field, Scene, Simulation};
+
+/// A model of the columns: name and lattice spacing [m].
+#[derive(Debug, Clone, Copy)]
+pub struct Model(pub &'static str, pub f64);
+
+/// 5 x 25 x 5 particles.
+pub const M1: Model = Model("M1", 1.0 / 4.0);
+/// 7 x 37 x 7 particles.
+pub const M2: Model = Model("M2", 1.0 / 6.0);
+/// 9 x 49 x 9 particles.
+pub const M3: Model = Model("M3", 1.0 / 8.0);
+/// 17 x 97 x 17 particles.
+pub const M4: Model = Model("M4", 1.0 / 16.0);
+
+fn example(case: &str, file: &str) -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "examples", case, file]
+        .iter()
+        .collect()
+}
+
+/// The scene of an example with overrides.
+pub fn scene(case: &str, overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
+    Scene::from_file(example(case, "scene.json"), &overrides).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A simulation of an example on one thread: the tests themselves run in parallel.
+pub fn simulation(case: &str, overrides: &[&str]) -> Simulation {
+    with_threads(case, overrides, 1)
+}
+
+/// The same with a number of threads.
+pub fn with_threads(case: &str, overrides: &[&str], threads: usize) -> Simulation {
+    Simulation::with_threads(scene(case, overrides), threads)
+        .unwrap_or_else(|e| panic!("{case} {overrides:?}: {e}"))
+}
+
+/// A simulation of a column.
+pub fn column(case: &str, model: Model, overrides: &[&str]) -> Simulation {
+    let spacing = format!("geometry.box.spacing={}", model.1);
+    let mut all = vec![spacing.as_str()];
+    all.extend_from_slice(overrides);
+    let threads = if model.1 < M3.1 { 2 } else { 1 };
+    with_threads(case, &all, threads)
+}
+
+/// Runs to `end` in stable steps and shows the simulation after every one.
+pub fn run(simulation: &mut Simulation, end: f64, mut after: impl FnMut(&Simulation)) {
+    while simulation.time() < end {
+        // A hair less than the stable step, so that rounding does not make two of it.
+        let next = simulation.time() + simulation.stable_step() * (1.0 - 1e-9);
+        simulation
+            .advance(next.min(end))
+            .unwrap_or_else(|e| panic!("{}: {e}", simulation.scene().title));
+        after(simulation);
+    }
+}
+
+/// A field of all particles.
+pub fn field(simulation: &Simulation, field: Field) -> Vec<f64> {
+    let mut values = vec![0.0; simulation.particle_count() * field.info().components];
+    simulation
+        .read_field(field, &mut values)
+        .expect("the buffer fits");
+    values
+}
+
+/// Displacement of a probe by name.
+pub fn displacement(simulation: &Simulation, probe: &str) -> [f64; 3] {
+    let index = simulation.probe_names().iter().position(|n| n == probe);
+    simulation
+        .probe(index.expect("a probe of the scene"))
+        .displacement
+}
+
+/// Prints a residual with its tolerance and fails if it is larger, or not a number.
+#[track_caller]
+pub fn check(what: &str, residual: f64, tolerance: f64) {
+    println!("{what}: residual {residual:.3e}, tolerance {tolerance:.3e}");
+    assert!(
+        residual <= tolerance,
+        "{what}: {residual:e} > {tolerance:e}"
+    );
+}
+
+/// Prints a value that has a lower bound and fails if it is smaller, or not a number.
+#[track_caller]
+pub fn check_at_least(what: &str, value: f64, bound: f64) {
+    println!("{what}: {value:.3}, at least {bound:.3}");
+    assert!(value >= bound, "{what}: {value} < {bound}");
+}
+
+/// Observed order between two resolutions.
+pub fn order(coarse: (f64, f64), fine: (f64, f64)) -> f64 {
+    (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
+}
+
+/// Euclidean norm.
+pub fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// Largest absolute difference.
+pub fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).fold(0.0, |m, (a, b)| (a - b).abs().max(m))
+}
+
+/// Columns of numbers over time.
+pub struct Table {
+    names: Vec<String>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// The reference solution of an example.
+    pub fn expected(case: &str) -> Self {
+        let path = example(case, "expected.csv");
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
+        let mut lines = text.lines();
+        let names = lines
+            .next()
+            .expect("a header")
+            .split(',')
+            .map(str::to_owned)
+            .collect();
+        let number = |s: &str| s.parse().unwrap_or_else(|e| panic!("{path:?}: `{s}`: {e}"));
+        let rows = lines
+            .map(|line| line.split(',').map(number).collect())
+            .collect();
+        Self { names, rows }
+    }
+
+    /// Index of a column.
+    pub fn column(&self, name: &str) -> usize {
+        self.names
+            .iter()
+            .position(|n| n == name)
+            .unwrap_or_else(|| panic!("no column {name}"))
+    }
+
+    /// Last time.
+    pub fn end(&self) -> f64 {
+        self.rows.last().expect("rows")[0]
+    }
+
+    /// Value of a column at a time, linear between the rows.
+    pub fn at(&self, column: usize, time: f64) -> f64 {
+        let next = self
+            .rows
+            .partition_point(|row| row[0] < time)
+            .clamp(1, self.rows.len() - 1);
+        let (a, b) = (&self.rows[next - 1], &self.rows[next]);
+        a[column] + (time - a[0]) / (b[0] - a[0]) * (b[column] - a[column])
+    }
+
+    /// Times and values of a column.
+    pub fn samples(&self, column: usize) -> impl Iterator<Item = (f64, f64)> {
+        self.rows.iter().map(move |row| (row[0], row[column]))
+    }
+}
