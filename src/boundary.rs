@@ -10,7 +10,7 @@ use crate::math::*;
 use crate::parallel;
 use crate::particles::{Particles, PatchFacets};
 use crate::reference::Reference;
-use crate::scene::{Scene, ScalarFunction, Support, VectorFunction};
+use crate::scene::{ScalarFunction, Scene, Support, VectorFunction};
 use crate::simulation::{Input, Patch, Quantity};
 
 /// Boundary of a body.
@@ -108,23 +108,35 @@ impl Boundary {
                 let known: Vec<&str> = this.patches.iter().map(|p| p.name.as_str()).collect();
                 return Err(Error::scene(
                     format!("boundary.{name}"),
-                    format!("selects no particle; the body's patches are {}", known.join(", ")),
+                    format!(
+                        "selects no particle; the body's patches are {}",
+                        known.join(", ")
+                    ),
                 )
                 .at_boundary(name));
             };
             if let Some(traction) = &condition.traction {
                 let source = this.vector_source(patch, Quantity::Traction, traction.compile()?);
-                this.loads.push(Load { patch, quantity: Quantity::Traction, source });
+                this.loads.push(Load {
+                    patch,
+                    quantity: Quantity::Traction,
+                    source,
+                });
             }
             if let Some(pressure) = &condition.pressure {
                 let function = pressure.compile()?;
                 let source = match function {
-                    ScalarFunction::External { start, per_particle } => {
-                        this.input(patch, Quantity::Pressure, vec![start], per_particle)
-                    }
+                    ScalarFunction::External {
+                        start,
+                        per_particle,
+                    } => this.input(patch, Quantity::Pressure, vec![start], per_particle),
                     function => Source::Scalar(function),
                 };
-                this.loads.push(Load { patch, quantity: Quantity::Pressure, source });
+                this.loads.push(Load {
+                    patch,
+                    quantity: Quantity::Pressure,
+                    source,
+                });
             }
             if let Some(support) = condition.support {
                 constraints.extend(homogeneous(patch, support, &particles.patches[patch]));
@@ -153,9 +165,10 @@ impl Boundary {
 
     fn vector_source(&mut self, patch: usize, quantity: Quantity, f: VectorFunction) -> Source {
         match f {
-            VectorFunction::External { start, per_particle } => {
-                self.input(patch, quantity, start.to_vec(), per_particle)
-            }
+            VectorFunction::External {
+                start,
+                per_particle,
+            } => self.input(patch, quantity, start.to_vec(), per_particle),
             function => Source::Vector(function),
         }
     }
@@ -167,7 +180,12 @@ impl Boundary {
         start: Vec<f64>,
         per_particle: bool,
     ) -> Source {
-        self.inputs.push(Input { patch, quantity, per_particle, start });
+        self.inputs.push(Input {
+            patch,
+            quantity,
+            per_particle,
+            start,
+        });
         Source::Input(self.inputs.len() - 1)
     }
 
@@ -208,7 +226,9 @@ impl Boundary {
         }
         let mut basis: Vec<[f64; 3]> = Vec::new();
         for direction in group.iter().flat_map(|c| &c.directions) {
-            let rest = basis.iter().fold(*direction, |r, e| axpy3(r, -dot(*direction, *e), *e));
+            let rest = basis
+                .iter()
+                .fold(*direction, |r, e| axpy3(r, -dot(*direction, *e), *e));
             let norm = dot(rest, rest).sqrt();
             if norm > 1e-6 {
                 basis.push(scale3(1.0 / norm, rest));
@@ -235,7 +255,12 @@ impl Boundary {
             .iter()
             .filter_map(|c| {
                 let (member, source, set) = c.prescribed.clone()?;
-                Some(Prescribed { patch: c.patch, member, source, set })
+                Some(Prescribed {
+                    patch: c.patch,
+                    member,
+                    source,
+                    set,
+                })
             })
             .collect();
         Ok(Supported {
@@ -398,7 +423,9 @@ impl Boundary {
         let layout = reference.layout;
         let (x, v) = (reference.x_initial.components(), state.v.components());
         let volume = reference.volume.components()[0];
-        let constant = body_force.is_constant().then(|| body_force.eval([0.0; 3], t));
+        let constant = body_force
+            .is_constant()
+            .then(|| body_force.eval([0.0; 3], t));
         let powers = parallel::map_slabs(force.slabs_mut(), |slab, out| {
             let (first, _) = layout.slab_range(slab);
             let mut power = 0.0;
@@ -418,15 +445,20 @@ impl Boundary {
             }
             Ok(power)
         });
-        powers.into_iter().try_fold(0.0, |total, power| match power {
-            Ok(power) => Ok(total + power),
-            Err(a) => Err(Error::scene(
-                "body_force",
-                "the value is not finite here: check the expression for this place and time",
-            )
-            .at_particle(self.order[a - Layout::FIRST] as usize, Some(reference.x_initial.get(a)))
-            .at_time(t)),
-        })
+        powers
+            .into_iter()
+            .try_fold(0.0, |total, power| match power {
+                Ok(power) => Ok(total + power),
+                Err(a) => Err(Error::scene(
+                    "body_force",
+                    "the value is not finite here: check the expression for this place and time",
+                )
+                .at_particle(
+                    self.order[a - Layout::FIRST] as usize,
+                    Some(reference.x_initial.get(a)),
+                )
+                .at_time(t)),
+            })
     }
 
     /// Rate of change of the prescribed velocity at time `t`, by a difference over `span` [m/s^2].
@@ -517,8 +549,7 @@ impl Boundary {
             // Reaction = inertia - all other forces, along the constrained directions.
             let applied = self.applied_forces(url, state, reference, t, inputs)?;
             for s in &self.supports {
-                let inertia =
-                    scale3(s.mass, self.prescribed_acceleration(s, t, span, inputs)?);
+                let inertia = scale3(s.mass, self.prescribed_acceleration(s, t, span, inputs)?);
                 let reaction = sub3(inertia, applied.get(s.slot));
                 for (patch, share) in &s.shares {
                     act(*patch, s.slot, mat_vec(share, reaction));
@@ -540,7 +571,11 @@ impl Boundary {
             .iter()
             .position(|i| i.patch == patch && i.quantity == quantity)
             .ok_or_else(|| {
-                let zero = if quantity == Quantity::Pressure { "0" } else { "[0, 0, 0]" };
+                let zero = if quantity == Quantity::Pressure {
+                    "0"
+                } else {
+                    "[0, 0, 0]"
+                };
                 Error::argument(format!(
                     "the scene does not drive this {q} from outside: declare \
                      \"boundary\": {{\"{n}\": {{\"{q}\": {{\"external\": {zero}}}}}}}",
@@ -557,7 +592,8 @@ impl Boundary {
         let input = &self.inputs[index];
         let (n, particles) = (input.quantity.components(), self.members[input.patch].len());
         let place = |e: Error| {
-            e.at_boundary(&self.patches[input.patch].name).at_field(input.quantity.name())
+            e.at_boundary(&self.patches[input.patch].name)
+                .at_field(input.quantity.name())
         };
         if values.len() != n && values.len() != n * particles {
             return Err(place(Error::argument(format!(
@@ -608,7 +644,12 @@ fn homogeneous(patch: usize, support: Support, facets: &PatchFacets) -> Vec<Cons
                     vec![u, cross(n, u)]
                 }
             };
-            Constraint { particle: facet.particle, patch, directions, prescribed: None }
+            Constraint {
+                particle: facet.particle,
+                patch,
+                directions,
+                prescribed: None,
+            }
         })
         .collect()
 }
@@ -622,7 +663,9 @@ fn describe(facets: &PatchFacets, particles: &Particles) -> (Patch, Vec<Member>)
             slot: Layout::slot(body),
             position: particles.positions[body],
             area: group.iter().map(|f| f.area).sum(),
-            area_vector: group.iter().fold([0.0; 3], |s, f| axpy3(s, f.area, f.normal)),
+            area_vector: group
+                .iter()
+                .fold([0.0; 3], |s, f| axpy3(s, f.area, f.normal)),
         });
     }
     let caller = |m: &Member| particles.caller(m.slot - Layout::FIRST);
@@ -636,7 +679,11 @@ fn describe(facets: &PatchFacets, particles: &Particles) -> (Patch, Vec<Member>)
             .map(|m| {
                 let length = dot(m.area_vector, m.area_vector).sqrt();
                 // Opposite faces of a thin part cancel: such a particle has no one normal.
-                if length > 0.0 { scale3(1.0 / length, m.area_vector) } else { [0.0; 3] }
+                if length > 0.0 {
+                    scale3(1.0 / length, m.area_vector)
+                } else {
+                    [0.0; 3]
+                }
             })
             .collect(),
     };

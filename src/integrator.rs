@@ -15,17 +15,35 @@ pub struct Stage {
 
 /// Three-stage strong-stability-preserving Runge-Kutta ([URL22] 61).
 pub const SSP_RK3: [Stage; 3] = [
-    Stage { keep: 0.0, take: 1.0, time: 0.0, weight: 1.0 / 6.0 },
-    Stage { keep: 0.75, take: 0.25, time: 1.0, weight: 1.0 / 6.0 },
-    Stage { keep: 1.0 / 3.0, take: 2.0 / 3.0, time: 0.5, weight: 2.0 / 3.0 },
+    Stage {
+        keep: 0.0,
+        take: 1.0,
+        time: 0.0,
+        weight: 1.0 / 6.0,
+    },
+    Stage {
+        keep: 0.75,
+        take: 0.25,
+        time: 1.0,
+        weight: 1.0 / 6.0,
+    },
+    Stage {
+        keep: 1.0 / 3.0,
+        take: 2.0 / 3.0,
+        time: 0.5,
+        weight: 2.0 / 3.0,
+    },
 ];
 
 /// Factors of v^n, of the velocity of the stage before, and of the present velocity, in steps, that
 /// with x^n make the arm of a stage for which the step conserves angular momentum. [URL22] 64 with
 /// its misprint mended: sum x^{n+1} x p^{n+1} worked out for the three stages gives x^n - dt v^n,
 /// x^n + dt/6 (v^* - v^n), x^n + dt/6 (v^n + v^* + 4 v^**).
-pub const ANGULAR_ARMS: [[f64; 3]; 3] =
-    [[-1.0, 0.0, 0.0], [-1.0 / 6.0, 0.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0]];
+pub const ANGULAR_ARMS: [[f64; 3]; 3] = [
+    [-1.0, 0.0, 0.0],
+    [-1.0 / 6.0, 0.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0],
+];
 
 #[cfg(test)]
 mod tests {

@@ -138,7 +138,10 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self { value: self.simd.$call(self.value, other.value), ..self }
+                Self {
+                    value: self.simd.$call(self.value, other.value),
+                    ..self
+                }
             }
         }
     };
@@ -152,7 +155,10 @@ impl<S: Simd> Neg for Wide<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { value: self.simd.neg_f64s(self.value), ..self }
+        Self {
+            value: self.simd.neg_f64s(self.value),
+            ..self
+        }
     }
 }
 
@@ -162,7 +168,10 @@ impl<S: Simd> Wide<S> {
     #[inline(always)]
     fn select_greater(self, other: Self, yes: Self, no: Self) -> Self {
         let mask = self.simd.greater_than_f64s(self.value, other.value);
-        Self { value: self.simd.select_f64s(mask, yes.value, no.value), ..self }
+        Self {
+            value: self.simd.select_f64s(mask, yes.value, no.value),
+            ..self
+        }
     }
 }
 
@@ -175,15 +184,24 @@ impl<S: Simd> Lane for Wide<S> {
     }
     #[inline(always)]
     fn splat(simd: S, value: f64) -> Self {
-        Self { simd, value: simd.splat_f64s(value) }
+        Self {
+            simd,
+            value: simd.splat_f64s(value),
+        }
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
-        Self { value: self.simd.mul_add_f64s(self.value, a.value, b.value), ..self }
+        Self {
+            value: self.simd.mul_add_f64s(self.value, a.value, b.value),
+            ..self
+        }
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self { value: self.simd.sqrt_f64s(self.value), ..self }
+        Self {
+            value: self.simd.sqrt_f64s(self.value),
+            ..self
+        }
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
@@ -200,7 +218,10 @@ impl<S: Simd> Lane for Wide<S> {
     #[inline(always)]
     fn load(simd: S, from: &[f64], at: usize) -> Self {
         let (whole, _) = S::as_simd_f64s(&from[at..at + Self::WIDTH]);
-        Self { simd, value: whole[0] }
+        Self {
+            simd,
+            value: whole[0],
+        }
     }
     #[inline(always)]
     fn store(self, to: &mut [f64], at: usize) {
@@ -266,7 +287,9 @@ mod tests {
 
     #[test]
     fn inverse_cube_root_is_accurate_and_the_same_in_every_width() {
-        let x: Vec<f64> = (0..4000).map(|i| 10f64.powf(-6.0 + f64::from(i) * 0.003)).collect();
+        let x: Vec<f64> = (0..4000)
+            .map(|i| 10f64.powf(-6.0 + f64::from(i) * 0.003))
+            .collect();
         let (mut wide, mut single) = (vec![0.0; x.len()], vec![0.0; x.len()]);
         vectorised(CubeRoots(&x, &mut wide));
         CubeRoots(&x, &mut single).run::<f64>(());

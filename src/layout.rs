@@ -22,7 +22,11 @@ impl Layout {
     /// to feed many threads, large enough to make its bookkeeping negligible.
     pub fn new(particles: usize) -> Self {
         let slices = particles.div_ceil(SLICE).max(1);
-        Self { particles, slices, slab: (slices / 256).clamp(8, 256) }
+        Self {
+            particles,
+            slices,
+            slab: (slices / 256).clamp(8, 256),
+        }
     }
     /// First slot: the guard slice comes before.
     pub const FIRST: usize = SLICE;
@@ -37,13 +41,20 @@ impl Layout {
     /// First slot and number of slices of a slab.
     pub fn slab_range(&self, index: usize) -> (usize, usize) {
         let first = index * self.slab;
-        (Self::FIRST + first * SLICE, self.slab.min(self.slices - first))
+        (
+            Self::FIRST + first * SLICE,
+            self.slab.min(self.slices - first),
+        )
     }
     /// Slices from one component to the next. A distance that is a multiple of 4 kB would map all
     /// components of a particle to the same cache set.
     fn stride(&self) -> usize {
         let stride = self.slices + 2;
-        if stride % 64 == 0 { stride + 1 } else { stride }
+        if stride.is_multiple_of(64) {
+            stride + 1
+        } else {
+            stride
+        }
     }
 }
 
@@ -66,7 +77,14 @@ impl<const N: usize> Array<N> {
     }
     /// An array without particles, to stand in for one that is taken out for a while.
     pub fn empty() -> Self {
-        Self { data: Vec::new(), layout: Layout { particles: 0, slices: 0, slab: 1 } }
+        Self {
+            data: Vec::new(),
+            layout: Layout {
+                particles: 0,
+                slices: 0,
+                slab: 1,
+            },
+        }
     }
     /// The components, each with its guard slices: index them with a slot.
     #[inline(always)]
@@ -124,7 +142,9 @@ impl<const N: usize> Array<N> {
         (0..self.layout.slabs())
             .map(|_| {
                 std::array::from_fn(|c| {
-                    bytemuck::must_cast_slice_mut(pieces[c].next().expect("as many pieces as slabs"))
+                    bytemuck::must_cast_slice_mut(
+                        pieces[c].next().expect("as many pieces as slabs"),
+                    )
                 })
             })
             .collect()

@@ -34,7 +34,12 @@
 
 mod boundary;
 pub mod error;
+pub mod ffi;
 pub mod fields;
+#[cfg(feature = "fmi")]
+#[allow(unsafe_code)] // The C functions of FMI.
+#[path = "../fmu/mod.rs"]
+pub mod fmu;
 mod formulation;
 mod integrator;
 mod kernel;
@@ -44,6 +49,7 @@ pub mod ledger;
 mod material;
 mod math;
 mod neighbours;
+pub mod output;
 mod parallel;
 mod particles;
 mod plan;
@@ -57,9 +63,7 @@ pub use fields::{Configuration, FIELDS, Field, FieldInfo};
 pub use ledger::{Energies, Momenta, Resultant};
 pub use plan::Plan;
 pub use scene::Scene;
-pub use simulation::{
-    Control, Input, Patch, ProbeMotion, Progress, Quantity, Simulation, View,
-};
+pub use simulation::{Control, Input, Patch, ProbeMotion, Progress, Quantity, Simulation, View};
 pub use snapshot::Snapshot;
 
 /// Version of the library, the header and the FMU.

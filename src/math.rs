@@ -52,7 +52,11 @@ pub fn scale3<T: Lane>(s: T, a: Vec3<T>) -> Vec3<T> {
 /// a + s b.
 #[inline(always)]
 pub fn axpy3<T: Lane>(a: Vec3<T>, s: T, b: Vec3<T>) -> Vec3<T> {
-    [s.mul_add(b[0], a[0]), s.mul_add(b[1], a[1]), s.mul_add(b[2], a[2])]
+    [
+        s.mul_add(b[0], a[0]),
+        s.mul_add(b[1], a[1]),
+        s.mul_add(b[2], a[2]),
+    ]
 }
 
 /// a . b.
@@ -64,7 +68,11 @@ pub fn dot<T: Lane>(a: Vec3<T>, b: Vec3<T>) -> T {
 /// a x b.
 #[inline(always)]
 pub fn cross<T: Lane>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 /// A a.
@@ -88,19 +96,31 @@ pub fn scale9<T: Lane>(s: T, a: &Mat3<T>) -> Mat3<T> {
 /// A + s B.
 #[inline(always)]
 pub fn axpy9<T: Lane>(a: &Mat3<T>, s: T, b: &Mat3<T>) -> Mat3<T> {
-    [axpy3(a[0], s, b[0]), axpy3(a[1], s, b[1]), axpy3(a[2], s, b[2])]
+    [
+        axpy3(a[0], s, b[0]),
+        axpy3(a[1], s, b[1]),
+        axpy3(a[2], s, b[2]),
+    ]
 }
 
 /// A + a b^T.
 #[inline(always)]
 pub fn add_outer<T: Lane>(m: &Mat3<T>, a: Vec3<T>, b: Vec3<T>) -> Mat3<T> {
-    [axpy3(m[0], a[0], b), axpy3(m[1], a[1], b), axpy3(m[2], a[2], b)]
+    [
+        axpy3(m[0], a[0], b),
+        axpy3(m[1], a[1], b),
+        axpy3(m[2], a[2], b),
+    ]
 }
 
 /// A^T.
 #[inline(always)]
 pub fn transpose<T: Lane>(m: &Mat3<T>) -> Mat3<T> {
-    [[m[0][0], m[1][0], m[2][0]], [m[0][1], m[1][1], m[2][1]], [m[0][2], m[1][2], m[2][2]]]
+    [
+        [m[0][0], m[1][0], m[2][0]],
+        [m[0][1], m[1][1], m[2][1]],
+        [m[0][2], m[1][2], m[2][2]],
+    ]
 }
 
 /// a^T B.
@@ -148,7 +168,11 @@ pub fn tensor_cross<T: Lane>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
 #[inline(always)]
 pub fn largest_eigenvalue<T: Lane>(a: &Mat3<T>) -> T {
     let token = a[0][0].token();
-    let (one, half, three) = (T::splat(token, 1.0), T::splat(token, 0.5), T::splat(token, 3.0));
+    let (one, half, three) = (
+        T::splat(token, 1.0),
+        T::splat(token, 0.5),
+        T::splat(token, 3.0),
+    );
     let m = (a[0][0] + a[1][1] + a[2][2]) * T::splat(token, 1.0 / 3.0);
     let d = [a[0][0] - m, a[1][1] - m, a[2][2] - m];
     let off = a[0][1] * a[0][1] + a[0][2] * a[0][2] + a[1][2] * a[1][2];

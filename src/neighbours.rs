@@ -22,10 +22,13 @@ impl Graph {
     /// the body that hangs on nothing.
     pub fn new(particles: &Particles, neighbours: Neighbours) -> Result<Self> {
         let lists = match neighbours {
-            Neighbours::Lattice(number) => lattice_lists(&particles.lattice, particles.count(), number),
-            Neighbours::Radius { radius } => {
-                radius_lists(&particles.positions, radius * particles.lattice.largest_spacing())
+            Neighbours::Lattice(number) => {
+                lattice_lists(&particles.lattice, particles.count(), number)
             }
+            Neighbours::Radius { radius } => radius_lists(
+                &particles.positions,
+                radius * particles.lattice.largest_spacing(),
+            ),
         };
         let graph = Self::from_lists(lists);
         graph.check_connected(particles)?;
@@ -109,7 +112,10 @@ fn lattice_lists(lattice: &Lattice, count: usize, number: u8) -> Vec<Vec<u32>> {
         }
     }
     parallel::fill(count, |i| {
-        let mut list: Vec<u32> = offsets.iter().filter_map(|o| lattice.neighbour(i, *o)).collect();
+        let mut list: Vec<u32> = offsets
+            .iter()
+            .filter_map(|o| lattice.neighbour(i, *o))
+            .collect();
         list.sort_unstable();
         list
     })
@@ -133,7 +139,9 @@ fn radius_lists(positions: &[[f64; 3]], radius: f64) -> Vec<Vec<u32>> {
                 for dx in -1..=1 {
                     let key = [centre[0] + dx, centre[1] + dy, centre[2] + dz];
                     for &b in cells.get(&key).into_iter().flatten() {
-                        let d: f64 = (0..3).map(|a| (positions[b as usize][a] - x[a]).powi(2)).sum();
+                        let d: f64 = (0..3)
+                            .map(|a| (positions[b as usize][a] - x[a]).powi(2))
+                            .sum();
                         if b as usize != i && d <= reach {
                             list.push(b);
                         }

@@ -3,14 +3,23 @@
 //! Slabs depend on the number of particles alone, so that every sum has the same order, and the
 //! results the same bits, whatever the number of threads.
 
+use std::thread::JoinHandle;
+
 use rayon::prelude::*;
 
 use crate::error::{Code, Error, Result};
 
+/// Beginning of the names of the pools' threads.
+pub const THREAD_NAME_PREFIX: &str = "urlsph-";
+
 /// Threads of one simulation. A pool of its own lives and dies with it: a global pool would leak
 /// threads into a host that loads and unloads the library.
 #[derive(Debug)]
-pub struct Pool(rayon::ThreadPool);
+pub struct Pool {
+    /// `None` only while the pool is dropped.
+    pool: Option<rayon::ThreadPool>,
+    threads: Vec<JoinHandle<()>>,
+}
 
 impl Pool {
     /// A pool of `threads` threads; 0 means as many as the machine has cores.
@@ -21,22 +30,53 @@ impl Pool {
                 "{threads} threads asked for, at most {MOST} are possible: give 0 for one per core"
             )));
         }
-        rayon::ThreadPoolBuilder::new()
+        let mut this = Self {
+            pool: None,
+            threads: Vec::new(),
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
-            .thread_name(|i| format!("urlsph-{i}"))
+            .spawn_handler(|thread| {
+                let name = format!("{THREAD_NAME_PREFIX}{}", thread.index());
+                let builder = std::thread::Builder::new().name(name);
+                this.threads.push(builder.spawn(|| thread.run())?);
+                Ok(())
+            })
             .build()
-            .map(Self)
-            .map_err(|e| Error::new(Code::OutOfMemory, format!("the thread pool did not start: {e}")))
+            .map_err(|e| {
+                Error::new(
+                    Code::OutOfMemory,
+                    format!("the thread pool did not start: {e}"),
+                )
+            })?;
+        this.pool = Some(pool);
+        Ok(this)
+    }
+
+    fn pool(&self) -> &rayon::ThreadPool {
+        self.pool.as_ref().expect("there until the pool is dropped")
     }
 
     /// Number of threads.
     pub fn threads(&self) -> usize {
-        self.0.current_num_threads()
+        self.pool().current_num_threads()
     }
 
     /// Runs `work` inside the pool; parallel calls below it use the pool's threads.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
-        self.0.install(work)
+        self.pool().install(work)
+    }
+}
+
+impl Drop for Pool {
+    /// Waits for the threads: a host may unload the library, with the code that they run, right after
+    /// it has destroyed its last simulation.
+    fn drop(&mut self) {
+        self.pool = None;
+        for thread in self.threads.drain(..) {
+            // A panic on it was reported where its work was awaited.
+            let _ = thread.join();
+        }
     }
 }
 
@@ -45,15 +85,31 @@ pub fn map_slabs<I: Send, R: Send>(
     slabs: Vec<I>,
     work: impl Fn(usize, I) -> R + Sync + Send,
 ) -> Vec<R> {
-    slabs.into_par_iter().enumerate().map(|(i, slab)| work(i, slab)).collect()
+    slabs
+        .into_par_iter()
+        .enumerate()
+        .map(|(i, slab)| work(i, slab))
+        .collect()
 }
 
 /// Fills a vector from its index, in parallel.
 pub fn fill<R: Send>(count: usize, value: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
-    (0..count).into_par_iter().with_min_len(256).map(value).collect()
+    (0..count)
+        .into_par_iter()
+        .with_min_len(256)
+        .map(value)
+        .collect()
 }
 
 /// Calls `work(row, values)` for all rows of a row-major table.
-pub fn for_each_row(table: &mut [f64], columns: usize, work: impl Fn(usize, &mut [f64]) + Sync + Send) {
-    table.par_chunks_exact_mut(columns).with_min_len(256).enumerate().for_each(|(i, row)| work(i, row));
+pub fn for_each_row(
+    table: &mut [f64],
+    columns: usize,
+    work: impl Fn(usize, &mut [f64]) + Sync + Send,
+) {
+    table
+        .par_chunks_exact_mut(columns)
+        .with_min_len(256)
+        .enumerate()
+        .for_each(|(i, row)| work(i, row));
 }

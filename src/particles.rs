@@ -151,7 +151,10 @@ impl Lattice {
 
 /// Divides the axis between the bounds of all boxes.
 fn lattice_lines(boxes: &[(String, &BoxGeometry)], axis: usize) -> Vec<f64> {
-    let mut bounds: Vec<f64> = boxes.iter().flat_map(|(_, b)| [b.min[axis], b.max[axis]]).collect();
+    let mut bounds: Vec<f64> = boxes
+        .iter()
+        .flat_map(|(_, b)| [b.min[axis], b.max[axis]])
+        .collect();
     bounds.sort_by(f64::total_cmp);
     let slack = 1e-9 * (bounds[bounds.len() - 1] - bounds[0]);
     bounds.dedup_by(|a, b| *a - *b <= slack);
@@ -167,7 +170,11 @@ fn lattice_lines(boxes: &[(String, &BoxGeometry)], axis: usize) -> Vec<f64> {
             .unwrap_or(1);
         for i in 1..=cells {
             let s = i as f64 / cells as f64;
-            lines.push(if i == cells { to } else { from + s * (to - from) });
+            lines.push(if i == cells {
+                to
+            } else {
+                from + s * (to - from)
+            });
         }
     }
     lines
@@ -214,7 +221,12 @@ impl Particles {
             )
             .at_path("geometry"));
         }
-        let mut lattice = Lattice { lines, filled: Vec::new(), node: Vec::new(), sites: Vec::new() };
+        let mut lattice = Lattice {
+            lines,
+            filled: Vec::new(),
+            node: Vec::new(),
+            sites: Vec::new(),
+        };
         let cells = [0, 1, 2].map(|a| lattice.cells(a));
         let mut owner = vec![NONE; cells.iter().product()];
         for (number, (_, b)) in boxes.iter().enumerate() {
@@ -277,7 +289,8 @@ impl Particles {
                     let body = this.positions.len() as u32;
                     this.lattice.node[n] = body;
                     this.lattice.sites.push(site.map(|s| s as u32));
-                    this.positions.push(std::array::from_fn(|a| this.lattice.lines[a][site[a]]));
+                    this.positions
+                        .push(std::array::from_fn(|a| this.lattice.lines[a][site[a]]));
                     this.volumes.push(volumes_by_node[n]);
                     this.order.push(caller_of_node[n]);
                     this.rank[caller_of_node[n] as usize] = body;
@@ -344,7 +357,8 @@ fn boundary_faces(
                             continue;
                         }
                         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-                        let width = |a: usize| lattice.lines[a][cell[a] + 1] - lattice.lines[a][cell[a]];
+                        let width =
+                            |a: usize| lattice.lines[a][cell[a] + 1] - lattice.lines[a][cell[a]];
                         let mut centre: [f64; 3] = std::array::from_fn(|a| {
                             0.5 * (lattice.lines[a][cell[a] + 1] + lattice.lines[a][cell[a]])
                         });
@@ -382,7 +396,9 @@ fn facets<'a>(faces: impl Iterator<Item = &'a BoundaryFace>) -> Vec<Facet> {
     let mut areas: BTreeMap<(u32, usize, bool), f64> = BTreeMap::new();
     for face in faces {
         for corner in face.corners {
-            *areas.entry((corner, face.axis, face.sign > 0.0)).or_default() += 0.25 * face.area;
+            *areas
+                .entry((corner, face.axis, face.sign > 0.0))
+                .or_default() += 0.25 * face.area;
         }
     }
     areas
@@ -390,7 +406,11 @@ fn facets<'a>(faces: impl Iterator<Item = &'a BoundaryFace>) -> Vec<Facet> {
         .map(|((particle, axis, positive), area)| {
             let mut normal = [0.0; 3];
             normal[axis] = if positive { 1.0 } else { -1.0 };
-            Facet { particle, normal, area }
+            Facet {
+                particle,
+                normal,
+                area,
+            }
         })
         .collect()
 }
@@ -410,10 +430,17 @@ fn patches(
         })
         .collect();
     for (name, selection) in selections {
-        if let Some(unknown) = selection.faces.iter().find(|f| !names.contains(&f.as_str())) {
+        if let Some(unknown) = selection
+            .faces
+            .iter()
+            .find(|f| !names.contains(&f.as_str()))
+        {
             return Err(Error::scene(
                 format!("patches.{name}.faces"),
-                format!("the body has no exposed face `{unknown}`; it has {}", names.join(", ")),
+                format!(
+                    "the body has no exposed face `{unknown}`; it has {}",
+                    names.join(", ")
+                ),
             ));
         }
         let inside = |c: &[f64; 3]| {
@@ -423,7 +450,9 @@ fn patches(
             })
         };
         let facets = facets(
-            faces.iter().filter(|f| selection.faces.contains(&f.name) && inside(&f.centre)),
+            faces
+                .iter()
+                .filter(|f| selection.faces.contains(&f.name) && inside(&f.centre)),
         );
         if facets.is_empty() {
             return Err(Error::scene(
@@ -432,7 +461,10 @@ fn patches(
             )
             .at_boundary(name));
         }
-        patches.push(PatchFacets { name: name.clone(), facets });
+        patches.push(PatchFacets {
+            name: name.clone(),
+            facets,
+        });
     }
     Ok(patches)
 }

@@ -1,6 +1,8 @@
 //! What a scene will cost and which physics it switches on, for `urlsph check`.
 
-use crate::scene::{Limiter, Neighbours, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights};
+use crate::scene::{
+    Limiter, Neighbours, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights,
+};
 
 /// What a scene will cost.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,18 +62,30 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
     );
     feature(
         n.volume_dissipation > 0.0,
-        format!("volume dissipation D^j (coefficient {})", n.volume_dissipation),
+        format!(
+            "volume dissipation D^j (coefficient {})",
+            n.volume_dissipation
+        ),
     );
     feature(
         n.reference_update != ReferenceUpdate::Never,
         match n.reference_update {
             ReferenceUpdate::Every(steps) => {
-                format!("reference update every {steps} steps, kernel option {}", n.kernel_option)
+                format!(
+                    "reference update every {steps} steps, kernel option {}",
+                    n.kernel_option
+                )
             }
-            _ => format!("reference update every step, kernel option {}", n.kernel_option),
+            _ => format!(
+                "reference update every step, kernel option {}",
+                n.kernel_option
+            ),
         },
     );
-    feature(n.angular_momentum_projection, "angular-momentum projection".to_string());
+    feature(
+        n.angular_momentum_projection,
+        "angular-momentum projection".to_string(),
+    );
     feature(scene.body_force.is_some(), "body force".to_string());
     (on, off)
 }

@@ -45,7 +45,11 @@ impl Slices {
     pub fn of(&self, a: usize) -> NeighboursOf<'_> {
         let (slice, lane) = ((a - Layout::FIRST) / SLICE, (a - Layout::FIRST) % SLICE);
         let entries = self.start[slice] as usize..self.start[slice + 1] as usize;
-        NeighboursOf { base: self.base[entries.clone()].iter(), pair: entries.start * SLICE + lane, lane }
+        NeighboursOf {
+            base: self.base[entries.clone()].iter(),
+            pair: entries.start * SLICE + lane,
+            lane,
+        }
     }
     /// Weights by pair index.
     #[inline(always)]
@@ -54,7 +58,11 @@ impl Slices {
     }
 
     fn new(graph: &Graph, layout: Layout) -> Self {
-        let mut this = Self { start: vec![0], base: Vec::new(), weight: Vec::new() };
+        let mut this = Self {
+            start: vec![0],
+            base: Vec::new(),
+            weight: Vec::new(),
+        };
         let mut offsets = Vec::new();
         for slice in 0..layout.slices {
             let first = slice * SLICE;
@@ -67,7 +75,11 @@ impl Slices {
             offsets.dedup();
             // A lane of the slice has a neighbour at each offset, so the base is at most 7 slots
             // before the first particle: inside the guard.
-            this.base.extend(offsets.iter().map(|o| (Layout::slot(first) as i64 + o) as u32));
+            this.base.extend(
+                offsets
+                    .iter()
+                    .map(|o| (Layout::slot(first) as i64 + o) as u32),
+            );
             this.weight.resize(this.base.len(), Slots([0.0; SLICE]));
             this.start.push(this.base.len() as u32);
         }
@@ -79,7 +91,9 @@ impl Slices {
         let (slice, lane) = (a / SLICE, a % SLICE);
         let range = self.start[slice] as usize..self.start[slice + 1] as usize;
         let base = (Layout::slot(b) - lane) as u32;
-        let at = self.base[range.clone()].binary_search(&base).expect("pair in its slice");
+        let at = self.base[range.clone()]
+            .binary_search(&base)
+            .expect("pair in its slice");
         (range.start + at) * SLICE + lane
     }
 }
@@ -125,7 +139,10 @@ impl PairVectors for Lean<'_> {
     #[inline(always)]
     fn pair<T: Lane>(&self, centre: Vec3<T>, b: usize, pair: usize) -> (Vec3<T>, Vec3<T>) {
         let token = centre[0].token();
-        let g = scale3(T::load(token, self.k, pair), sub3(load3(token, &self.x, b), centre));
+        let g = scale3(
+            T::load(token, self.k, pair),
+            sub3(load3(token, &self.x, b), centre),
+        );
         (g, [-g[0], -g[1], -g[2]])
     }
 }
@@ -203,13 +220,21 @@ pub struct Reference {
 
 #[inline(always)]
 pub(crate) fn load3<T: Lane>(token: T::Token, from: &[&[f64]; 3], at: usize) -> Vec3<T> {
-    [T::load(token, from[0], at), T::load(token, from[1], at), T::load(token, from[2], at)]
+    [
+        T::load(token, from[0], at),
+        T::load(token, from[1], at),
+        T::load(token, from[2], at),
+    ]
 }
 
 #[inline(always)]
 pub(crate) fn load9<T: Lane>(token: T::Token, from: &[&[f64]; 9], at: usize) -> Mat3<T> {
     let [a, b, c, d, e, f, g, h, i] = from;
-    [load3(token, &[a, b, c], at), load3(token, &[d, e, f], at), load3(token, &[g, h, i], at)]
+    [
+        load3(token, &[a, b, c], at),
+        load3(token, &[d, e, f], at),
+        load3(token, &[g, h, i], at),
+    ]
 }
 
 #[inline(always)]
@@ -246,7 +271,10 @@ fn pull_back<T: Lane>(
 ) -> (Vec3<T>, Mat3<T>) {
     let sum = add9(&load9::<T>(token, f_chi, a), &load9(token, f_chi, b));
     let inverse = inverse(&scale9(T::splat(token, 0.5), &sum));
-    (mat_vec(&inverse, sub3(load3(token, chi, b), load3(token, chi, a))), inverse)
+    (
+        mat_vec(&inverse, sub3(load3(token, chi, b), load3(token, chi, a))),
+        inverse,
+    )
 }
 
 impl Reference {
@@ -305,7 +333,11 @@ impl Reference {
         };
         let h: Vec<f64> = parallel::fill(graph.count(), |a| {
             self.smoothing_factor
-                * graph.of(a).iter().map(|&b| distance(a, b)).fold(0.0, f64::max)
+                * graph
+                    .of(a)
+                    .iter()
+                    .map(|&b| distance(a, b))
+                    .fold(0.0, f64::max)
         });
         // Lengths and volumes over their means: weights of order one in any unit system.
         let unit = h.iter().sum::<f64>() / h.len() as f64;
@@ -317,7 +349,8 @@ impl Reference {
                 Weights::Unit => 0.5 * (kernel::slope(r, ha) + kernel::slope(r, hb)),
                 // V_b as printed; V_a, common to all pairs of a, makes the weight symmetric.
                 Weights::Tributary => {
-                    particles.volumes[a] * particles.volumes[b as usize] / (mean_volume * mean_volume)
+                    particles.volumes[a] * particles.volumes[b as usize]
+                        / (mean_volume * mean_volume)
                         * kernel::slope(r, hb)
                 }
             }
@@ -350,13 +383,19 @@ impl Reference {
 
     fn new_stored(&self) -> StoredVectors {
         let zeros = || std::array::from_fn(|_| vec![Slots([0.0; SLICE]); self.slices.base.len()]);
-        StoredVectors { ab: zeros(), ba: zeros() }
+        StoredVectors {
+            ab: zeros(),
+            ba: zeros(),
+        }
     }
 
     /// The pair vectors now.
     pub fn pair_vectors(&self) -> Pairs<'_> {
         match &self.stored {
-            None => Pairs::Lean(Lean { k: self.slices.weights(), x: self.x_initial.components() }),
+            None => Pairs::Lean(Lean {
+                k: self.slices.weights(),
+                x: self.x_initial.components(),
+            }),
             Some(s) => Pairs::Stored(Stored {
                 ab: std::array::from_fn(|c| bytemuck::must_cast_slice(&s.ab[c][..])),
                 ba: std::array::from_fn(|c| bytemuck::must_cast_slice(&s.ba[c][..])),
@@ -385,10 +424,26 @@ impl Reference {
             Some(u) if this.option > 1 => u.chi.components(),
             _ => this.x_initial.components(),
         };
-        let f_chi = updated.filter(|_| this.option < 4).map(|u| u.f_chi.components());
+        let f_chi = updated
+            .filter(|_| this.option < 4)
+            .map(|u| u.f_chi.components());
         let bad = parallel::map_slabs(l.slabs_mut(), |slab, out| match this.pair_vectors() {
-            Pairs::Lean(pairs) => vectorised(Correct { pairs, this, points, f_chi, slab, out }),
-            Pairs::Stored(pairs) => vectorised(Correct { pairs, this, points, f_chi, slab, out }),
+            Pairs::Lean(pairs) => vectorised(Correct {
+                pairs,
+                this,
+                points,
+                f_chi,
+                slab,
+                out,
+            }),
+            Pairs::Stored(pairs) => vectorised(Correct {
+                pairs,
+                this,
+                points,
+                f_chi,
+                slab,
+                out,
+            }),
         });
         self.l = l;
         bad.into_iter().flatten().next()
@@ -396,16 +451,32 @@ impl Reference {
 
     /// g_ab of options #3 and #4 from chi and F_chi.
     fn updated_vectors(&mut self) {
-        let u = self.updated.as_ref().expect("called for an updated reference");
-        let (chi, f_chi, j_chi) = (u.chi.components(), u.f_chi.components(), u.j_chi.components()[0]);
+        let u = self
+            .updated
+            .as_ref()
+            .expect("called for an updated reference");
+        let (chi, f_chi, j_chi) = (
+            u.chi.components(),
+            u.f_chi.components(),
+            u.j_chi.components()[0],
+        );
         let volume = self.volume.components()[0];
         let mut h = Array::<1>::new(self.layout, [1.0]);
         parallel::map_slabs(h.slabs_mut(), |slab, [out]| {
-            vectorised(SmoothingLength { this: self, chi, f_chi, slab, out });
+            vectorised(SmoothingLength {
+                this: self,
+                chi,
+                f_chi,
+                slab,
+                out,
+            });
         });
         let particles = self.layout.particles as f64;
         let mean = |values: &[f64]| {
-            values[Layout::FIRST..Layout::FIRST + self.layout.particles].iter().sum::<f64>() / particles
+            values[Layout::FIRST..Layout::FIRST + self.layout.particles]
+                .iter()
+                .sum::<f64>()
+                / particles
         };
         let h = h.components()[0];
         let (unit, mean_volume) = (mean(h), mean(volume));
@@ -418,8 +489,9 @@ impl Reference {
         let mut outputs = Vec::new();
         {
             let vectors = stored.ab.iter_mut().chain(stored.ba.iter_mut());
-            let mut rest: Vec<&mut [f64]> =
-                vectors.map(|v| bytemuck::must_cast_slice_mut(&mut v[..])).collect();
+            let mut rest: Vec<&mut [f64]> = vectors
+                .map(|v| bytemuck::must_cast_slice_mut(&mut v[..]))
+                .collect();
             for slab in 0..self.layout.slabs() {
                 let length = entries(slab).len() * SLICE;
                 let mut pieces = Vec::with_capacity(6);
@@ -433,7 +505,15 @@ impl Reference {
         }
         parallel::map_slabs(outputs, |slab, out| {
             vectorised(PulledBackVectors {
-                this: self, chi, f_chi, j_chi, h, unit, mean_volume, slab, out,
+                this: self,
+                chi,
+                f_chi,
+                j_chi,
+                h,
+                unit,
+                mean_volume,
+                slab,
+                out,
             });
         });
         self.stored = Some(stored);
@@ -448,7 +528,11 @@ impl Reference {
                 + u.h_chi.as_ref().map_or(0, Array::bytes)
         });
         let entries = self.slices.base.len();
-        let stored = if self.stored.is_some() { entries * 6 * size_of::<Slots>() } else { 0 };
+        let stored = if self.stored.is_some() {
+            entries * 6 * size_of::<Slots>()
+        } else {
+            0
+        };
         entries * (size_of::<Slots>() + size_of::<u32>())
             + self.slices.start.len() * size_of::<u32>()
             + self.x_initial.bytes()
@@ -483,7 +567,10 @@ impl<P: PairVectors> Work for Correct<'_, P> {
             };
             let cof = cofactor(&f);
             let f_inverse_t = scale9(T::splat(token, 1.0) / dot(f[0], cof[0]), &cof);
-            let (xa, centre) = (load3(token, &self.points, a), self.pairs.centre::<T>(token, a));
+            let (xa, centre) = (
+                load3(token, &self.points, a),
+                self.pairs.centre::<T>(token, a),
+            );
             let mut moment = [zero3(token); 3];
             for (b, pair) in self.this.slices.of(a) {
                 let (g, _) = self.pairs.pair(centre, b, pair);
@@ -595,12 +682,17 @@ impl Work for PulledBackVectors<'_> {
                         }
                     }
                 };
-                let direction =
-                    if this.option == 4 { mat_vec(&transpose(&f_inverse), r) } else { r };
+                let direction = if this.option == 4 {
+                    mat_vec(&transpose(&f_inverse), r)
+                } else {
+                    r
+                };
                 let mask = T::load(token, weights, pair);
                 for (c, d) in direction.into_iter().enumerate() {
-                    mask.if_positive(k * d, zero).store(self.out[c], pair - offset);
-                    mask.if_positive(-(back * d), zero).store(self.out[3 + c], pair - offset);
+                    mask.if_positive(k * d, zero)
+                        .store(self.out[c], pair - offset);
+                    mask.if_positive(-(back * d), zero)
+                        .store(self.out[3 + c], pair - offset);
                 }
             }
         }

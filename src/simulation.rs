@@ -205,7 +205,9 @@ impl Simulation {
             boundary,
             accounts: Accounts::default(),
             start: state.clone(),
-            velocity_before: numerics.angular_momentum_projection.then(|| state.v.clone()),
+            velocity_before: numerics
+                .angular_momentum_projection
+                .then(|| state.v.clone()),
             state,
             reference,
             url,
@@ -214,11 +216,23 @@ impl Simulation {
             generation: 0,
             scene,
         };
-        this.boundary.constrain(&mut this.state.v, 0.0, &this.inputs)?;
+        this.boundary
+            .constrain(&mut this.state.v, 0.0, &this.inputs)?;
         this.evaluate()?;
         this.accounts.initial = this.evaluation.kinetic + this.evaluation.strain;
         this.resultants = this.compute_resultants()?;
+        // A load that has no finite value at the start is an error of the scene, not of its first step.
+        this.nodal_forces()?;
         Ok(this)
+    }
+
+    fn nodal_forces(&self) -> Result<Array<3>> {
+        let now = (self.time, self.stable_step());
+        let (url, state) = (&self.url, &self.state);
+        self.pool.install(|| {
+            self.boundary
+                .nodal_forces(url, state, &self.reference, now, &self.inputs)
+        })
     }
 
     /// The scene.
@@ -239,7 +253,11 @@ impl Simulation {
         Plan {
             particles: self.particle_count(),
             pairs: self.pair_count(),
-            neighbours: (fewest, self.pair_count() as f64 / self.particle_count() as f64, most),
+            neighbours: (
+                fewest,
+                self.pair_count() as f64 / self.particle_count() as f64,
+                most,
+            ),
             stable_step: dt,
             steps: (self.scene.time.end / dt).ceil() as u64,
             memory: self.memory(),
@@ -328,7 +346,11 @@ impl Simulation {
             let (stable, remaining) = (self.stable_step(), t_next - self.time);
             let last = remaining <= stable;
             // Two equal steps instead of a full one and a splinter.
-            let dt = if last { remaining } else { stable.min(0.5 * remaining) };
+            let dt = if last {
+                remaining
+            } else {
+                stable.min(0.5 * remaining)
+            };
             let time = if last { t_next } else { self.time + dt };
             if time <= self.time {
                 return Err(Error::new(
@@ -342,9 +364,16 @@ impl Simulation {
                 .at_time(self.time));
             }
             self.step(dt, time)?;
-            let progress = Progress { time: self.time, end: t_next, dt, steps: self.steps };
+            let progress = Progress {
+                time: self.time,
+                end: t_next,
+                dt,
+                steps: self.steps,
+            };
             if observer(&progress) == Control::Cancel {
-                return Err(Error::new(Code::Cancelled, "cancelled by the caller").at_time(self.time));
+                return Err(
+                    Error::new(Code::Cancelled, "cancelled by the caller").at_time(self.time)
+                );
             }
         }
         Ok(())
@@ -371,7 +400,17 @@ impl Simulation {
     }
 
     fn stages(&mut self, dt: f64, end: f64) -> Result<()> {
-        let Self { pool, boundary, state, reference, inputs, accounts, url, start, .. } = self;
+        let Self {
+            pool,
+            boundary,
+            state,
+            reference,
+            inputs,
+            accounts,
+            url,
+            start,
+            ..
+        } = self;
         let before = self.velocity_before.as_mut();
         let evaluation = &mut self.evaluation;
         let (time, steps, numerics) = (self.time, self.steps + 1, &self.scene.numerics);
@@ -387,24 +426,34 @@ impl Simulation {
                     let factors = ANGULAR_ARMS[i].map(|c| c * dt);
                     let density = url.law().density();
                     let power = angular_momentum::project(
-                        &mut url.rates.force, state, start, before, factors, density, reference,
+                        &mut url.rates.force,
+                        state,
+                        start,
+                        before,
+                        factors,
+                        density,
+                        reference,
                     );
                     accounts.projection -= share * power;
                     before.copy_from(&state.v);
                 }
                 let mut force = std::mem::replace(&mut url.rates.force, Array::empty());
-                let power = boundary.add_loads(&mut force, url, state, reference, stage_time, inputs);
+                let power =
+                    boundary.add_loads(&mut force, url, state, reference, stage_time, inputs);
                 url.rates.force = force;
-                accounts.external_work += share
-                    * (power? - boundary.constrained_power(&url.rates.force, &state.v));
+                accounts.external_work +=
+                    share * (power? - boundary.constrained_power(&url.rates.force, &state.v));
                 accounts.dissipation += share * evaluation.dissipation;
                 url.advance_stage(state, start, reference, (stage.keep, stage.take), dt);
                 let next = SSP_RK3.get(i + 1).map_or(end, |next| time + next.time * dt);
                 boundary.constrain(&mut state.v, next, inputs)?;
                 if i + 1 == SSP_RK3.len() && is_stale(numerics, steps) {
-                    url.update_reference(state, reference).map_err(|b| diverged(b, state))?;
+                    url.update_reference(state, reference)
+                        .map_err(|b| diverged(b, state))?;
                 }
-                *evaluation = url.evaluate(state, reference).map_err(|b| diverged(b, state))?;
+                *evaluation = url
+                    .evaluate(state, reference)
+                    .map_err(|b| diverged(b, state))?;
             }
             // What the supports did: they held the constrained components against all forces.
             accounts.external_work += boundary.constrained_kinetic(&state.v) - held;
@@ -412,9 +461,20 @@ impl Simulation {
         })
     }
 
-    /// Rates of the present state.
-    fn evaluate(&mut self) -> Result<()> {
-        let Self { pool, url, state, reference, .. } = self;
+    /// Evaluates the right-hand side at the present state once more. It changes nothing: this is
+    /// what the benches time.
+    ///
+    /// # Errors
+    /// None for a state that a step has left.
+    #[doc(hidden)]
+    pub fn evaluate(&mut self) -> Result<()> {
+        let Self {
+            pool,
+            url,
+            state,
+            reference,
+            ..
+        } = self;
         self.evaluation = pool
             .install(|| url.evaluate(state, reference))
             .map_err(|b| diverged(b, &self.state, &self.order, self.time))?;
@@ -440,13 +500,15 @@ impl Simulation {
     fn compute_resultants(&self) -> Result<Vec<Resultant>> {
         let now = (self.time, self.stable_step());
         self.pool.install(|| {
-            self.boundary.resultants(&self.url, &self.state, &self.reference, now, &self.inputs)
+            self.boundary
+                .resultants(&self.url, &self.state, &self.reference, now, &self.inputs)
         })
     }
 
     /// Energies now.
     pub fn energies(&self) -> Energies {
-        self.accounts.energies(self.evaluation.kinetic, self.evaluation.strain)
+        self.accounts
+            .energies(self.evaluation.kinetic, self.evaluation.strain)
     }
 
     /// Momenta now.
@@ -473,11 +535,17 @@ impl Simulation {
     /// # Errors
     /// [`Code::InvalidArgument`] naming the patches that there are.
     pub fn patch_index(&self, name: &str) -> Result<usize> {
-        self.patches().iter().position(|p| p.name == name).ok_or_else(|| {
-            let names: Vec<&str> = self.patches().iter().map(|p| p.name.as_str()).collect();
-            Error::argument(format!("there is no patch `{name}`; there are {}", names.join(", ")))
+        self.patches()
+            .iter()
+            .position(|p| p.name == name)
+            .ok_or_else(|| {
+                let names: Vec<&str> = self.patches().iter().map(|p| p.name.as_str()).collect();
+                Error::argument(format!(
+                    "there is no patch `{name}`; there are {}",
+                    names.join(", ")
+                ))
                 .at_boundary(name)
-        })
+            })
     }
 
     /// Resultants of a patch now: what its own conditions exert, and its mean motion.
@@ -498,7 +566,10 @@ impl Simulation {
     /// # Panics
     /// If `probe` is not an index into [`probe_names`](Self::probe_names).
     pub fn probe(&self, probe: usize) -> ProbeMotion {
-        let mut motion = ProbeMotion { displacement: [0.0; 3], velocity: [0.0; 3] };
+        let mut motion = ProbeMotion {
+            displacement: [0.0; 3],
+            velocity: [0.0; 3],
+        };
         for &(particle, weight) in &self.probes.weights[probe] {
             let slot = Layout::slot(particle as usize);
             let u = sub3(self.state.x.get(slot), self.reference.x_initial.get(slot));
@@ -523,10 +594,15 @@ impl Simulation {
     pub fn set_input(&mut self, patch: usize, quantity: Quantity, values: &[f64]) -> Result<()> {
         let index = self.boundary.input_index(patch, quantity)?;
         self.boundary.check_input(index, values)?;
-        self.inputs[index].clear();
-        self.inputs[index].extend_from_slice(values);
+        let old = std::mem::replace(&mut self.inputs[index], values.to_vec());
+        match self.compute_resultants() {
+            Ok(resultants) => self.resultants = resultants,
+            Err(error) => {
+                self.inputs[index] = old;
+                return Err(error);
+            }
+        }
         self.generation += 1;
-        self.resultants = self.compute_resultants()?;
         Ok(())
     }
 
@@ -553,21 +629,17 @@ impl Simulation {
             ))
             .at_field(field.info().name));
         }
+        let force = match field {
+            Field::NodalForce => Some(self.nodal_forces()?),
+            _ => None,
+        };
         self.pool.install(|| {
-            let force = match field {
-                Field::NodalForce => {
-                    let now = (self.time, self.stable_step());
-                    let (url, state) = (&self.url, &self.state);
-                    Some(self.boundary.nodal_forces(url, state, &self.reference, now, &self.inputs)?)
-                }
-                _ => None,
-            };
             parallel::for_each_row(out, n, |caller, row| {
                 let slot = Layout::slot(self.rank[caller] as usize);
                 row.copy_from_slice(&self.field_at(field, slot, force.as_ref())[..n]);
             });
-            Ok(())
-        })
+        });
+        Ok(())
     }
 
     /// Value of a field at a slot; unused components are 0.
@@ -655,12 +727,17 @@ impl Simulation {
             && snapshot.state.h.is_some() == self.state.h.is_some()
             && snapshot.state.j.is_some() == self.state.j.is_some()
             && snapshot.updated.is_some() == self.reference.updated.is_some()
-            && snapshot.inputs.len() == self.inputs.len();
+            && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.time.is_finite();
         if !same_shape {
-            return Err(Error::new(Code::Snapshot, "the snapshot lacks fields of its scene: it is damaged"));
+            return Err(Error::new(
+                Code::Snapshot,
+                "the snapshot does not have the fields of its scene: it is damaged",
+            ));
         }
         let now = self.snapshot();
-        self.put(snapshot).inspect_err(|_| self.put(&now).expect("the present state was good"))
+        self.put(snapshot)
+            .inspect_err(|_| self.put(&now).expect("the present state was good"))
     }
 
     fn put(&mut self, snapshot: &Snapshot) -> Result<()> {
@@ -674,10 +751,15 @@ impl Simulation {
         self.state.copy_from(&snapshot.state);
         if snapshot.updated.is_some() && snapshot.updated != self.reference.updated {
             self.reference.updated.clone_from(&snapshot.updated);
-            let Self { pool, reference, .. } = self;
+            let Self {
+                pool, reference, ..
+            } = self;
             pool.install(|| reference.rebuild()).map_err(|slot| {
-                Error::new(Code::Snapshot, "the reference configuration of the snapshot is damaged")
-                    .at_particle(self.order[slot - Layout::FIRST] as usize, None)
+                Error::new(
+                    Code::Snapshot,
+                    "the reference configuration of the snapshot is damaged",
+                )
+                .at_particle(self.order[slot - Layout::FIRST] as usize, None)
             })?;
         }
         self.generation += 1;
@@ -694,7 +776,10 @@ impl Simulation {
 
 impl Probes {
     fn new(scene: &Scene, particles: &Particles) -> Result<Self> {
-        let mut this = Self { names: Vec::new(), weights: Vec::new() };
+        let mut this = Self {
+            names: Vec::new(),
+            weights: Vec::new(),
+        };
         for (name, point) in &scene.probes {
             let weights = particles.lattice.interpolation(*point).ok_or_else(|| {
                 Error::scene(format!("probes.{name}"), "the point lies outside the body")
@@ -708,14 +793,20 @@ impl Probes {
 
 /// Displacement and velocity at time 0; f follows from the positions by the discrete gradient, so
 /// that it is consistent with the operators.
-fn initial_state(scene: &Scene, reference: &Reference, particles: &Particles) -> Result<State> {
+pub(crate) fn initial_state(
+    scene: &Scene,
+    reference: &Reference,
+    particles: &Particles,
+) -> Result<State> {
     let mut state = State::at_rest(reference, scene.numerics.state);
     let finite = |value: [f64; 3], path: &str, i: usize| {
         if value.iter().all(|v| v.is_finite()) {
             return Ok(value);
         }
-        Err(Error::scene(path, "the value is not finite here: check the expression")
-            .at_particle(particles.caller(i), Some(particles.positions[i])))
+        Err(
+            Error::scene(path, "the value is not finite here: check the expression")
+                .at_particle(particles.caller(i), Some(particles.positions[i])),
+        )
     };
     if let Some(velocity) = &scene.initial.velocity {
         let velocity = velocity.compile()?;
@@ -740,7 +831,7 @@ fn is_stale(numerics: &Numerics, steps: u64) -> bool {
     match numerics.reference_update {
         ReferenceUpdate::Never => false,
         ReferenceUpdate::EveryStep => true,
-        ReferenceUpdate::Every(n) => steps % u64::from(n) == 0,
+        ReferenceUpdate::Every(n) => steps.is_multiple_of(u64::from(n)),
     }
 }
 
@@ -755,6 +846,9 @@ fn diverged(b: Breakdown, state: &State, order: &[u32], time: f64) -> Error {
         ),
     )
     .at_field(Field::Jacobian.info().name)
-    .at_particle(order[b.slot - Layout::FIRST] as usize, Some(state.x.get(b.slot)))
+    .at_particle(
+        order[b.slot - Layout::FIRST] as usize,
+        Some(state.x.get(b.slot)),
+    )
     .at_time(time)
 }

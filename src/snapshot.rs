@@ -36,6 +36,11 @@ pub(crate) fn scene_hash(scene: &Scene) -> u64 {
 trait Walk {
     fn word(&mut self, value: &mut u64) -> Result<()>;
     fn numbers(&mut self, values: &mut [f64]) -> Result<()>;
+    /// How many items follow, of at least eight bytes each.
+    fn length(&mut self, present: usize) -> Result<usize> {
+        self.word(&mut (present as u64))?;
+        Ok(present)
+    }
 
     fn number(&mut self, value: &mut f64) -> Result<()> {
         self.numbers(std::slice::from_mut(value))
@@ -47,7 +52,11 @@ trait Walk {
         }
         Ok(())
     }
-    fn optional<const N: usize>(&mut self, array: &mut Option<Array<N>>, layout: Layout) -> Result<()> {
+    fn optional<const N: usize>(
+        &mut self,
+        array: &mut Option<Array<N>>,
+        layout: Layout,
+    ) -> Result<()> {
         let mut present = u64::from(array.is_some());
         self.word(&mut present)?;
         match present {
@@ -70,16 +79,19 @@ impl Snapshot {
         walk.number(&mut self.time)?;
         walk.word(&mut self.steps)?;
         let a = &mut self.accounts;
-        for value in [&mut a.initial, &mut a.external_work, &mut a.dissipation, &mut a.projection] {
+        for value in [
+            &mut a.initial,
+            &mut a.external_work,
+            &mut a.dissipation,
+            &mut a.projection,
+        ] {
             walk.number(value)?;
         }
-        let mut inputs = self.inputs.len() as u64;
-        walk.word(&mut inputs)?;
-        self.inputs.resize_with(checked_length(inputs)?, Vec::new);
+        let inputs = walk.length(self.inputs.len())?;
+        self.inputs.resize_with(inputs, Vec::new);
         for values in &mut self.inputs {
-            let mut length = values.len() as u64;
-            walk.word(&mut length)?;
-            values.resize(checked_length(length)?, 0.0);
+            let length = walk.length(values.len())?;
+            values.resize(length, 0.0);
             walk.numbers(values)?;
         }
         let layout = self.state.x.layout();
@@ -110,8 +122,12 @@ impl Snapshot {
         let mut writer = Writer(Vec::new());
         writer.0.extend_from_slice(MAGIC);
         writer.0.extend_from_slice(&FORMAT.to_le_bytes());
-        writer.0.extend_from_slice(&(self.state.x.particles() as u32).to_le_bytes());
-        self.clone().walk(&mut writer).expect("writing to memory does not fail");
+        writer
+            .0
+            .extend_from_slice(&(self.state.x.particles() as u32).to_le_bytes());
+        self.clone()
+            .walk(&mut writer)
+            .expect("writing to memory does not fail");
         let sum = xxh3_64(&writer.0);
         writer.0.extend_from_slice(&sum.to_le_bytes());
         writer.0
@@ -126,7 +142,8 @@ impl Snapshot {
         if bytes.len() < HEAD + 8 || &bytes[..8] != MAGIC {
             return Err(damaged("it does not start like one"));
         }
-        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+        let word =
+            |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
         if word(8) != FORMAT {
             return Err(Error::new(
                 Code::Snapshot,
@@ -164,13 +181,19 @@ impl Snapshot {
         };
         let mut reader = Reader(&body[HEAD..]);
         snapshot.walk(&mut reader)?;
-        if reader.0.is_empty() { Ok(snapshot) } else { Err(damaged("it is too long")) }
+        if reader.0.is_empty() {
+            Ok(snapshot)
+        } else {
+            Err(damaged("it is too long"))
+        }
     }
 
     /// Hash of the content.
     pub fn hash(&self) -> u64 {
         let mut hasher = Hasher(Xxh3::new());
-        self.clone().walk(&mut hasher).expect("hashing does not fail");
+        self.clone()
+            .walk(&mut hasher)
+            .expect("hashing does not fail");
         hasher.0.digest()
     }
 }
@@ -180,11 +203,6 @@ fn damaged(what: &str) -> Error {
         Code::Snapshot,
         format!("not a usable snapshot, {what}: take it again from a running simulation"),
     )
-}
-
-/// Lengths come before their data: a damaged one must not ask for all the memory there is.
-fn checked_length(length: u64) -> Result<usize> {
-    if length <= 1 << 32 { Ok(length as usize) } else { Err(damaged("a length in it is absurd")) }
 }
 
 struct Writer(Vec<u8>);
@@ -222,8 +240,10 @@ struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
     fn take(&mut self, length: usize) -> Result<&[u8]> {
-        let (head, rest) =
-            self.0.split_at_checked(length).ok_or_else(|| damaged("it ends too early"))?;
+        let (head, rest) = self
+            .0
+            .split_at_checked(length)
+            .ok_or_else(|| damaged("it ends too early"))?;
         self.0 = rest;
         Ok(head)
     }
@@ -233,6 +253,15 @@ impl Walk for Reader<'_> {
     fn word(&mut self, value: &mut u64) -> Result<()> {
         *value = u64::from_le_bytes(self.take(8)?.try_into().expect("eight bytes"));
         Ok(())
+    }
+    /// Lengths come before their data: a damaged one must not ask for all the memory there is.
+    fn length(&mut self, _: usize) -> Result<usize> {
+        let mut length = 0;
+        self.word(&mut length)?;
+        usize::try_from(length)
+            .ok()
+            .filter(|&n| n <= self.0.len() / 8)
+            .ok_or_else(|| damaged("a length in it is absurd"))
     }
     fn numbers(&mut self, values: &mut [f64]) -> Result<()> {
         let bytes = self.take(8 * values.len())?;

@@ -71,9 +71,9 @@ pub fn project(
         }
         (inertia, torque)
     });
-    let (inertia, torque) = sums
-        .into_iter()
-        .fold(([[0.0; 3]; 3], [0.0; 3]), |s, p| (add9(&s.0, &p.0), add3(s.1, p.1)));
+    let (inertia, torque) = sums.into_iter().fold(([[0.0; 3]; 3], [0.0; 3]), |s, p| {
+        (add9(&s.0, &p.0), add3(s.1, p.1))
+    });
     let inertia = nalgebra::Matrix3::from_fn(|r, c| inertia[r][c]);
     let torque = nalgebra::Vector3::from(torque);
     // A body of three dimensions has a regular inertia.

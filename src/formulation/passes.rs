@@ -28,7 +28,9 @@ impl<'a> Kinematics<'a> {
             h: state.h.as_ref().map(Array::components),
             j: state.j.as_ref().map(|j| j.components()[0]),
             f_chi: updated.map(|u| u.f_chi.components()),
-            h_chi: updated.and_then(|u| u.h_chi.as_ref()).map(Array::components),
+            h_chi: updated
+                .and_then(|u| u.h_chi.as_ref())
+                .map(Array::components),
             j_chi: updated.map(|u| u.j_chi.components()[0]),
         }
     }
@@ -46,13 +48,17 @@ impl<'a> Kinematics<'a> {
         }
         let mut h = cofactor(&f);
         let mut j = dot(f[0], h[0]);
-        if STATE >= 1 && let Some(own) = self.j {
+        if STATE >= 1
+            && let Some(own) = self.j
+        {
             j = T::load(token, own, at);
             if UPDATED && let Some(j_chi) = self.j_chi {
                 j = j * T::load(token, j_chi, at);
             }
         }
-        if STATE >= 2 && let Some(own) = &self.h {
+        if STATE >= 2
+            && let Some(own) = &self.h
+        {
             h = load9(token, own, at);
             if UPDATED && let Some(h_chi) = &self.h_chi {
                 h = mat_mul(&h, &load9(token, h_chi, at));
@@ -78,7 +84,10 @@ fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [f64]; 9], at: usize) -> Ma
 #[inline(always)]
 fn lanes_of<T: Lane>(reference: &Reference, slab: usize) -> impl Iterator<Item = (usize, usize)> {
     let (first, slices) = reference.layout.slab_range(slab);
-    std::iter::zip((0..slices * SLICE).step_by(T::WIDTH), (first..).step_by(T::WIDTH))
+    std::iter::zip(
+        (0..slices * SLICE).step_by(T::WIDTH),
+        (first..).step_by(T::WIDTH),
+    )
 }
 
 /// Gradient of a vector field with respect to the reference (54).
@@ -134,7 +143,14 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
     type Output = std::result::Result<(f64, f64), Breakdown>;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> Self::Output {
-        let Self { law, kinematics, reference, v, slab, out } = self;
+        let Self {
+            law,
+            kinematics,
+            reference,
+            v,
+            slab,
+            out,
+        } = self;
         let (l, volume) = (reference.l.components(), reference.volume.components()[0]);
         let density = T::splat(token, law.density());
         let half = T::splat(token, 0.5);
@@ -146,7 +162,11 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
             let (l, v_r) = (load9::<T>(token, &l, a), T::load(token, volume, a));
 
             // Smallest stretch of F: 1/lambda^2 is the largest eigenvalue of F^-T F^-1.
-            let cof = if STATE >= 2 { cofactor(&total.f) } else { total.h };
+            let cof = if STATE >= 2 {
+                cofactor(&total.f)
+            } else {
+                total.h
+            };
             let det = dot(total.f[0], cof[0]);
             let stretch = det / largest_eigenvalue(&mat_mul_t(&cof, &cof)).sqrt();
             stretch.store(out.wave[0], at);
@@ -157,7 +177,11 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
             let cof_f = cofactor(&f);
             let factor = half / dot(f[0], cof_f[0]);
             let grad = load_slab9::<T>(token, &out.grad_v, at);
-            store9(&scale9(factor, &mat_mul_t(&grad, &cof_f)), &mut out.half_grad, at);
+            store9(
+                &scale9(factor, &mat_mul_t(&grad, &cof_f)),
+                &mut out.half_grad,
+                at,
+            );
 
             // Q = V_R P F_chi^T L and S = V_chi h L.
             let mut k = scale9(v_r, &l);
@@ -178,10 +202,14 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
 
             let velocity = load3::<T>(token, &v, a);
             (v_r * stress.energy).for_lanes(|_, energy| strain += energy);
-            (half * density * v_r * dot(velocity, velocity)).for_lanes(|_, energy| kinetic += energy);
+            (half * density * v_r * dot(velocity, velocity))
+                .for_lanes(|_, energy| kinetic += energy);
             total.j.min(det).for_lanes(|lane, jacobian| {
                 if breakdown.is_none() && !(jacobian > 0.0 && jacobian < f64::INFINITY) {
-                    breakdown = Some(Breakdown { slot: a + lane, jacobian });
+                    breakdown = Some(Breakdown {
+                        slot: a + lane,
+                        jacobian,
+                    });
                 }
             });
         }
@@ -305,7 +333,13 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
     type Output = (f64, f64);
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> (f64, f64) {
-        let Self { pairs, input, speeds, slab, mut out } = self;
+        let Self {
+            pairs,
+            input,
+            speeds,
+            slab,
+            mut out,
+        } = self;
         let slices = &input.reference.slices;
         let weights = slices.weights();
         let speeds = WaveSpeeds {
@@ -404,15 +438,19 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
     fn run<T: Lane>(self, token: T::Token) -> f64 {
         let Self { pairs, input, .. } = self;
         let volume = input.reference.volume.components()[0];
-        let (speed, coefficient) =
-            (T::splat(token, self.pressure_speed), T::splat(token, self.coefficient));
+        let (speed, coefficient) = (
+            T::splat(token, self.pressure_speed),
+            T::splat(token, self.coefficient),
+        );
         let mut power = 0.0;
         for (at, a) in lanes_of::<T>(input.reference, self.slab) {
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
             let sa = load9::<T>(token, &input.s, a);
-            let (sigma_a, slope_a) =
-                (T::load(token, self.sigma, a), load3::<T>(token, &self.slope, a));
+            let (sigma_a, slope_a) = (
+                T::load(token, self.sigma, a),
+                load3::<T>(token, &self.slope, a),
+            );
             let (mut rate, mut work) = (T::splat(token, 0.0), T::splat(token, 0.0));
             for (b, pair) in input.reference.slices.of(a) {
                 let (g, back) = pairs.pair(centre, b, pair);
@@ -471,7 +509,11 @@ impl Work for Advance<'_> {
         };
         let volume = self.reference.volume.components()[0];
         let start = self.start;
-        let (x0, v0, f0) = (start.x.components(), start.v.components(), start.f.components());
+        let (x0, v0, f0) = (
+            start.x.components(),
+            start.v.components(),
+            start.f.components(),
+        );
         let h0 = start.h.as_ref().map(Array::components);
         let j0 = start.j.as_ref().map(|j| j.components()[0]);
         let density = T::splat(token, self.density);
@@ -482,13 +524,22 @@ impl Work for Advance<'_> {
             let f = load_slab9::<T>(token, &out.f, at);
             let grad = load9::<T>(token, &self.grad_v, a);
             // Dummies have no volume and no force.
-            let mass =
-                density.mul_add(T::load(token, volume, a), T::splat(token, f64::MIN_POSITIVE));
-            let acceleration =
-                scale3(T::splat(token, 1.0) / mass, load3(token, &self.force, a));
+            let mass = density.mul_add(
+                T::load(token, volume, a),
+                T::splat(token, f64::MIN_POSITIVE),
+            );
+            let acceleration = scale3(T::splat(token, 1.0) / mass, load3(token, &self.force, a));
             store3(&blend.vector(load3(token, &x0, a), x, v), &mut out.x, at);
-            store3(&blend.vector(load3(token, &v0, a), v, acceleration), &mut out.v, at);
-            store9(&blend.tensor(&load9(token, &f0, a), &f, &grad), &mut out.f, at);
+            store3(
+                &blend.vector(load3(token, &v0, a), v, acceleration),
+                &mut out.v,
+                at,
+            );
+            store9(
+                &blend.tensor(&load9(token, &f0, a), &f, &grad),
+                &mut out.f,
+                at,
+            );
             if let (Some(j), Some(j0)) = (&mut out.j, j0) {
                 // dj/dt = h : grad v (56), with h = cof f where it is not independent.
                 let h = match &out.h {
@@ -505,7 +556,11 @@ impl Work for Advance<'_> {
             if let (Some(h), Some(h0)) = (&mut out.h, &h0) {
                 // dh/dt = f x grad v (55).
                 let now = load_slab9::<T>(token, h, at);
-                store9(&blend.tensor(&load9(token, h0, a), &now, &tensor_cross(&f, &grad)), h, at);
+                store9(
+                    &blend.tensor(&load9(token, h0, a), &now, &tensor_cross(&f, &grad)),
+                    h,
+                    at,
+                );
             }
         }
     }

@@ -62,13 +62,21 @@ pub fn dissipation<T: Lane>(pair: &Pair<T>, jump: Vec3<T>, speeds: WaveSpeeds<T>
     let inverse = norm.of(0.5) * pair.density * norm
         / pair.stretch.mul_add(pair.dx2, norm.of(f64::MIN_POSITIVE));
     let along = (speeds.pressure - speeds.shear) * dot(pair.dx, jump);
-    scale3(inverse, axpy3(scale3(speeds.shear * pair.dx2, jump), along, pair.dx))
+    scale3(
+        inverse,
+        axpy3(scale3(speeds.shear * pair.dx2, jump), along, pair.dx),
+    )
 }
 
 /// D^j_ab with a coefficient, for the rate of the volume V_chi dj/dt ([URL22] 59, 60): spatial like
 /// the above, coefficient |c_ab| / (2 rho c_p) (Sigma_j,R - Sigma_j,L).
 #[inline(always)]
-pub fn volume_dissipation<T: Lane>(pair: &Pair<T>, jump: T, pressure_speed: T, coefficient: T) -> T {
+pub fn volume_dissipation<T: Lane>(
+    pair: &Pair<T>,
+    jump: T,
+    pressure_speed: T,
+    coefficient: T,
+) -> T {
     let norm = dot(pair.area, pair.area).sqrt();
     coefficient * norm.of(0.5) * norm * pair.stretch / (pair.density * pressure_speed) * jump
 }

@@ -9,7 +9,6 @@ pub use neo_hookean::NeoHookean;
 use crate::lane::Lane;
 use crate::math::{Mat3, mat_mul_t, scale9};
 
-
 /// A hyperelastic law W(F, H, J).
 pub trait Material: Copy + Send + Sync {
     /// Density rho_R [kg/m^3], initial.
@@ -167,7 +166,11 @@ mod tests {
         let e = 1e-6;
         let shear = all(&[[1.0, e, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).p[0][1] / e;
         assert!((shear / moduli.mu - 1.0).abs() < 1e-5);
-        let volume = all(&[[1.0 + e, 0.0, 0.0], [0.0, 1.0 + e, 0.0], [0.0, 0.0, 1.0 + e]]);
+        let volume = all(&[
+            [1.0 + e, 0.0, 0.0],
+            [0.0, 1.0 + e, 0.0],
+            [0.0, 0.0, 1.0 + e],
+        ]);
         let pressure = (volume.p[0][0] + volume.p[1][1] + volume.p[2][2]) / 3.0;
         assert!((pressure / (3.0 * e) / moduli.kappa - 1.0).abs() < 1e-4);
         let turn = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];

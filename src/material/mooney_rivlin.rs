@@ -38,7 +38,11 @@ impl Material for MooneyRivlin {
     #[inline(always)]
     fn stress<T: Lane>(&self, f: &Mat3<T>, h: &Mat3<T>, j: T) -> Stress<T> {
         let token = j.token();
-        let (zeta, xi, kappa) = (T::splat(token, self.zeta), T::splat(token, self.xi), T::splat(token, self.moduli.kappa));
+        let (zeta, xi, kappa) = (
+            T::splat(token, self.zeta),
+            T::splat(token, self.xi),
+            T::splat(token, self.moduli.kappa),
+        );
         let j_third = j.inverse_cbrt();
         let j_two_thirds = j_third * j_third; // J^(-2/3)
         let inverse_j = T::splat(token, 1.0) / j;
@@ -48,7 +52,8 @@ impl Material for MooneyRivlin {
         let volumetric = j - T::splat(token, 1.0);
         let sigma_f = scale9(T::splat(token, 2.0) * zeta * j_two_thirds, f);
         let sigma_h = scale9(T::splat(token, 3.0) * xi_j2 * root_hh, h);
-        let distortion = T::splat(token, -2.0 / 3.0) * zeta * j_two_thirds * ff - T::splat(token, 2.0) * xi_j2 * hh * root_hh;
+        let distortion = T::splat(token, -2.0 / 3.0) * zeta * j_two_thirds * ff
+            - T::splat(token, 2.0) * xi_j2 * hh * root_hh;
         let sigma_j = distortion.mul_add(inverse_j, kappa * volumetric);
         let rest = T::splat(token, 3.0 * (self.zeta + 3f64.sqrt() * self.xi));
         Stress {

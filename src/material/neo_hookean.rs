@@ -32,7 +32,9 @@ impl Material for NeoHookean {
         Stress {
             p: axpy9(&scale9(mu_j, f), sigma_j, h),
             sigma_j,
-            energy: T::splat(token, 0.5) * (mu * (j_two_thirds * ff - T::splat(token, 3.0)) + kappa * volumetric * volumetric),
+            energy: T::splat(token, 0.5)
+                * (mu * (j_two_thirds * ff - T::splat(token, 3.0))
+                    + kappa * volumetric * volumetric),
         }
     }
 }

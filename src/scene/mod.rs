@@ -12,6 +12,7 @@ mod value;
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::io::Read;
 use std::path::Path;
 
 use schemars::JsonSchema;
@@ -254,7 +255,12 @@ impl Default for Numerics {
 impl Numerics {
     /// The CFL number: the scene's, or the largest that is proven stable for its neighbours.
     pub fn cfl_number(&self) -> f64 {
-        self.cfl.unwrap_or(if self.neighbours == Neighbours::Lattice(6) { 0.6 } else { 0.9 })
+        self.cfl
+            .unwrap_or(if self.neighbours == Neighbours::Lattice(6) {
+                0.6
+            } else {
+                0.9
+            })
     }
 }
 
@@ -441,9 +447,9 @@ impl Scene {
     /// is not in the JSON yet.
     ///
     /// # Errors
-    /// [`Code::Parse`](crate::Code::Parse) or [`Code::InvalidScene`](crate::Code::InvalidScene), with the JSON path;
-    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) for an override that has no place in the JSON;
-    /// [`Code::OutOfMemory`](crate::Code::OutOfMemory) for more particles than this machine can hold.
+    /// [`Code::Parse`] or [`Code::InvalidScene`], with the JSON path;
+    /// [`Code::InvalidArgument`] for an override that has no place in the JSON;
+    /// [`Code::OutOfMemory`] for more particles than this machine can hold.
     pub fn from_json(text: &str, overrides: &[String]) -> Result<Self> {
         let scene = parse::parse(text, overrides)?;
         scene
@@ -455,16 +461,26 @@ impl Scene {
     /// Reads, parses and validates a scene file; see [`from_json`](Self::from_json).
     ///
     /// # Errors
-    /// [`Code::Io`](crate::Code::Io) if the file cannot be read, otherwise as [`from_json`](Self::from_json);
+    /// [`Code::Io`] if the file cannot be read, otherwise as [`from_json`](Self::from_json);
     /// the message names the file.
     pub fn from_file(path: impl AsRef<Path>, overrides: &[String]) -> Result<Self> {
+        /// Far more than the parameters of any body; a device or a wrong file stops here.
+        const MOST: u64 = 64 << 20;
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|e| {
-            Error::new(
-                Code::Io,
-                format!("the scene {} cannot be read: {e}", path.display()),
-            )
-        })?;
+        let failed = |why: &dyn std::fmt::Display| {
+            let text = format!("the scene {} cannot be read: {why}", path.display());
+            Error::new(Code::Io, text)
+        };
+        let mut text = String::new();
+        let read = std::fs::File::open(path)
+            .and_then(|file| file.take(MOST + 1).read_to_string(&mut text))
+            .map_err(|e| failed(&e))?;
+        if read as u64 > MOST {
+            return Err(failed(&format_args!(
+                "it is larger than {} MiB",
+                MOST >> 20
+            )));
+        }
         Self::from_json(&text, overrides)
             .map_err(|e| e.with_note(&format!("in {}", path.display())))
     }

@@ -23,7 +23,8 @@ fn gradient(x: &[f64]) -> [[f64; 3]; 3] {
     let c: Vec<f64> = x.iter().map(|x| (k * x).cos()).collect();
     std::array::from_fn(|i| {
         std::array::from_fn(|j| {
-            let others = |a: usize, b: usize| (0..3).filter(move |&m| m != a && m != b).map(|m| c[m]);
+            let others =
+                |a: usize, b: usize| (0..3).filter(move |&m| m != a && m != b).map(|m| c[m]);
             if i == j {
                 k * c.iter().product::<f64>()
             } else {
@@ -54,7 +55,10 @@ fn errors(nodes: usize, time: f64, amplitude: f64, overrides: &[&str]) -> Errors
     let phase = omega() * time;
     let mut sums = [[0.0; 2]; 2];
     for (a, x) in positions.chunks_exact(3).enumerate() {
-        let (s, c) = (|i: usize| (0.5 * PI * x[i]).sin(), |i: usize| (0.5 * PI * x[i]).cos());
+        let (s, c) = (
+            |i: usize| (0.5 * PI * x[i]).sin(),
+            |i: usize| (0.5 * PI * x[i]).cos(),
+        );
         let shape = [s(0) * c(1) * c(2), c(0) * s(1) * c(2), c(0) * c(1) * s(2)];
         let g = gradient(x);
         let trace = g[0][0] + g[1][1] + g[2][2];
@@ -94,8 +98,16 @@ fn orders(what: &str, time: f64, overrides: &[&str]) -> [f64; 2] {
 
 fn second_order(what: &str, time: f64, overrides: &[&str]) {
     let [velocity, stress] = orders(what, time, overrides);
-    check_at_least(&format!("cube {what} t = {time} s, order of velocity"), velocity, 1.8);
-    check_at_least(&format!("cube {what} t = {time} s, order of stress"), stress, 1.8);
+    check_at_least(
+        &format!("cube {what} t = {time} s, order of velocity"),
+        velocity,
+        1.8,
+    );
+    check_at_least(
+        &format!("cube {what} t = {time} s, order of stress"),
+        stress,
+        1.8,
+    );
 }
 
 /// Half a period: the velocity error is the error of the phase.
@@ -121,15 +133,25 @@ fn errors_do_not_depend_on_the_amplitude() {
     let base = errors(17, 8e-3, AMPLITUDE, &[]);
     for factor in [0.1, 10.0] {
         let amplitude = factor * AMPLITUDE;
-        let mode = |a, b, c| {
-            format!("\"{amplitude:e}*sin(pi*{a}/2)*cos(pi*{b}/2)*cos(pi*{c}/2)\"")
-        };
-        let [x, y, z] = [mode("X", "Y", "Z"), mode("Y", "Z", "X"), mode("Z", "X", "Y")];
+        let mode = |a, b, c| format!("\"{amplitude:e}*sin(pi*{a}/2)*cos(pi*{b}/2)*cos(pi*{c}/2)\"");
+        let [x, y, z] = [
+            mode("X", "Y", "Z"),
+            mode("Y", "Z", "X"),
+            mode("Z", "X", "Y"),
+        ];
         let scaled = format!("initial.displacement=[{x}, {y}, {z}]");
         let found = errors(17, 8e-3, amplitude, &[&scaled]);
         let what = format!("cube, amplitude times {factor}: change of the error of");
-        check(&format!("{what} velocity"), (found.velocity / base.velocity - 1.0).abs(), 1e-3);
-        check(&format!("{what} stress"), (found.stress / base.stress - 1.0).abs(), 1e-3);
+        check(
+            &format!("{what} velocity"),
+            (found.velocity / base.velocity - 1.0).abs(),
+            1e-3,
+        );
+        check(
+            &format!("{what} stress"),
+            (found.stress / base.stress - 1.0).abs(),
+            1e-3,
+        );
     }
 }
 

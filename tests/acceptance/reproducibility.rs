@@ -7,11 +7,32 @@ use crate::support::*;
 /// Scenes and options that take different paths through the solver.
 const VARIANTS: &[(&str, &[&str])] = &[
     ("column_bending", &[]),
-    ("column_twisting", &["numerics.angular_momentum_projection=true"]),
+    (
+        "column_twisting",
+        &["numerics.angular_momentum_projection=true"],
+    ),
     ("column_twisting", &["numerics.reference_update=every_step"]),
-    ("column_twisting", &["numerics.reference_update=every_step", "numerics.kernel_option=2"]),
-    ("column_twisting", &["numerics.reference_update=every_step", "numerics.kernel_option=3"]),
-    ("column_twisting", &["numerics.reference_update=every_step", "numerics.kernel_option=4"]),
+    (
+        "column_twisting",
+        &[
+            "numerics.reference_update=every_step",
+            "numerics.kernel_option=2",
+        ],
+    ),
+    (
+        "column_twisting",
+        &[
+            "numerics.reference_update=every_step",
+            "numerics.kernel_option=3",
+        ],
+    ),
+    (
+        "column_twisting",
+        &[
+            "numerics.reference_update=every_step",
+            "numerics.kernel_option=4",
+        ],
+    ),
     (
         "column_twisting",
         &[
@@ -21,10 +42,25 @@ const VARIANTS: &[(&str, &[&str])] = &[
             "numerics.angular_momentum_projection=true",
         ],
     ),
-    ("column_bending", &["numerics.limiter=venkatakrishnan", "numerics.neighbours=26"]),
-    ("column_bending", &["numerics.limiter=minmod", "numerics.weights=tributary"]),
-    ("column_bending", &["body_force=[0, \"-9.81e3*sin(10*t)\", \"100*X\"]", "numerics.state=fj"]),
-    ("column_tension", &["numerics.reconstruction=none", "numerics.neighbours=6"]),
+    (
+        "column_bending",
+        &["numerics.limiter=venkatakrishnan", "numerics.neighbours=26"],
+    ),
+    (
+        "column_bending",
+        &["numerics.limiter=minmod", "numerics.weights=tributary"],
+    ),
+    (
+        "column_bending",
+        &[
+            "body_force=[0, \"-9.81e3*sin(10*t)\", \"100*X\"]",
+            "numerics.state=fj",
+        ],
+    ),
+    (
+        "column_tension",
+        &["numerics.reconstruction=none", "numerics.neighbours=6"],
+    ),
     ("l_block", &[]),
     ("elastic_cube", &["numerics.neighbours={\"radius\": 2.1}"]),
 ];
@@ -52,9 +88,15 @@ fn any_number_of_threads_gives_the_same_bits() {
             let before = simulation.state_hash();
             advance(&mut simulation);
             assert_ne!(simulation.state_hash(), before, "the body moves");
-            (simulation.state_hash(), simulation.energies().kinetic.to_bits())
+            (
+                simulation.state_hash(),
+                simulation.energies().kinetic.to_bits(),
+            )
         });
-        println!("{case} {overrides:?}: {:016x} with 1, 2, 3, 8 threads", hashes[0].0);
+        println!(
+            "{case} {overrides:?}: {:016x} with 1, 2, 3, 8 threads",
+            hashes[0].0
+        );
         assert_eq!(hashes, [hashes[0]; 4], "{case} {overrides:?}");
     }
 }
@@ -71,17 +113,44 @@ fn a_restored_run_gives_the_same_bits() {
         let snapshot = Snapshot::from_bytes(&bytes).expect("a snapshot");
         let mut restored = with_threads(case, overrides, 2);
         restored.restore(&snapshot).expect("of the same scene");
-        assert_eq!(restored.state_hash(), at_snapshot, "{case} {overrides:?}: as taken");
+        assert_eq!(
+            restored.state_hash(),
+            at_snapshot,
+            "{case} {overrides:?}: as taken"
+        );
         advance(&mut restored);
-        println!("{case} {overrides:?}: {:016x}, straight and restored", straight.state_hash());
-        assert_eq!(restored.state_hash(), straight.state_hash(), "{case} {overrides:?}");
-        assert_eq!(restored.energies(), straight.energies(), "{case} {overrides:?}");
-        let resultants = |s: &Simulation| (0..s.patches().len()).map(|p| s.resultant(p)).collect::<Vec<_>>();
-        assert_eq!(resultants(&restored), resultants(&straight), "{case} {overrides:?}");
+        println!(
+            "{case} {overrides:?}: {:016x}, straight and restored",
+            straight.state_hash()
+        );
+        assert_eq!(
+            restored.state_hash(),
+            straight.state_hash(),
+            "{case} {overrides:?}"
+        );
+        assert_eq!(
+            restored.energies(),
+            straight.energies(),
+            "{case} {overrides:?}"
+        );
+        let resultants = |s: &Simulation| {
+            (0..s.patches().len())
+                .map(|p| s.resultant(p))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            resultants(&restored),
+            resultants(&straight),
+            "{case} {overrides:?}"
+        );
 
         // A simulation that went elsewhere comes back.
         straight.restore(&snapshot).expect("of the same scene");
         advance(&mut straight);
-        assert_eq!(straight.state_hash(), restored.state_hash(), "{case} {overrides:?}: rolled back");
+        assert_eq!(
+            straight.state_hash(),
+            restored.state_hash(),
+            "{case} {overrides:?}: rolled back"
+        );
     }
 }

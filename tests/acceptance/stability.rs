@@ -45,8 +45,16 @@ fn stable(case: &str, model: Model) {
             e.closure_error / initial,
         );
         let what = format!("{case} {} nu = {nu}", model.0);
-        check(&format!("{what}: largest energy over E0 less 1"), most - 1.0, 1e-9);
-        check(&format!("{what}: energy out of nothing in one step"), rise, 1e-9);
+        check(
+            &format!("{what}: largest energy over E0 less 1"),
+            most - 1.0,
+            1e-9,
+        );
+        check(
+            &format!("{what}: energy out of nothing in one step"),
+            rise,
+            1e-9,
+        );
     }
 }
 

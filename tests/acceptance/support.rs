@@ -64,21 +64,28 @@ pub fn run(simulation: &mut Simulation, end: f64, mut after: impl FnMut(&Simulat
 /// A field of all particles.
 pub fn field(simulation: &Simulation, field: Field) -> Vec<f64> {
     let mut values = vec![0.0; simulation.particle_count() * field.info().components];
-    simulation.read_field(field, &mut values).expect("the buffer fits");
+    simulation
+        .read_field(field, &mut values)
+        .expect("the buffer fits");
     values
 }
 
 /// Displacement of a probe by name.
 pub fn displacement(simulation: &Simulation, probe: &str) -> [f64; 3] {
     let index = simulation.probe_names().iter().position(|n| n == probe);
-    simulation.probe(index.expect("a probe of the scene")).displacement
+    simulation
+        .probe(index.expect("a probe of the scene"))
+        .displacement
 }
 
 /// Prints a residual with its tolerance and fails if it is larger, or not a number.
 #[track_caller]
 pub fn check(what: &str, residual: f64, tolerance: f64) {
     println!("{what}: residual {residual:.3e}, tolerance {tolerance:.3e}");
-    assert!(residual <= tolerance, "{what}: {residual:e} > {tolerance:e}");
+    assert!(
+        residual <= tolerance,
+        "{what}: {residual:e} > {tolerance:e}"
+    );
 }
 
 /// Prints a value that has a lower bound and fails if it is smaller, or not a number.
@@ -110,15 +117,25 @@ impl Table {
         let path = example(case, "expected.csv");
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
         let mut lines = text.lines();
-        let names = lines.next().expect("a header").split(',').map(str::to_owned).collect();
+        let names = lines
+            .next()
+            .expect("a header")
+            .split(',')
+            .map(str::to_owned)
+            .collect();
         let number = |s: &str| s.parse().unwrap_or_else(|e| panic!("{path:?}: `{s}`: {e}"));
-        let rows = lines.map(|line| line.split(',').map(number).collect()).collect();
+        let rows = lines
+            .map(|line| line.split(',').map(number).collect())
+            .collect();
         Self { names, rows }
     }
 
     /// Index of a column.
     pub fn column(&self, name: &str) -> usize {
-        self.names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no column {name}"))
+        self.names
+            .iter()
+            .position(|n| n == name)
+            .unwrap_or_else(|| panic!("no column {name}"))
     }
 
     /// Last time.
@@ -128,7 +145,10 @@ impl Table {
 
     /// Value of a column at a time, linear between the rows.
     pub fn at(&self, column: usize, time: f64) -> f64 {
-        let next = self.rows.partition_point(|row| row[0] < time).clamp(1, self.rows.len() - 1);
+        let next = self
+            .rows
+            .partition_point(|row| row[0] < time)
+            .clamp(1, self.rows.len() - 1);
         let (a, b) = (&self.rows[next - 1], &self.rows[next]);
         a[column] + (time - a[0]) / (b[0] - a[0]) * (b[column] - a[column])
     }

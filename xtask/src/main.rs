@@ -1,1 +1,64 @@
-fn main() {}
+//! The project's tasks: `cargo xtask <task>`.
+
+mod demo;
+mod ffi_tests;
+mod fmu_tests;
+mod header;
+mod install;
+mod output_tests;
+mod project;
+mod tally;
+mod test;
+mod validate;
+mod venv;
+mod wheel;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+const HELP: &str = "\
+Usage: cargo xtask <TASK>
+
+Tasks:
+  demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
+              fields, histories and pictures under target/demo/
+  ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
+  header      Generate include/urlsph.h; with --check only see whether it is up to date
+  install     --prefix DIR [--destdir DIR]: command line, library, headers, pkg-config and CMake
+              files
+  test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
+  validate    The long comparisons with reference solutions, with residuals and tolerances
+  wheel       The Python package with the library inside, in target/wheel/
+";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &[String]) -> Result<()> {
+    let sh = project::shell()?;
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match arguments.as_slice() {
+        ["demo"] => demo::demo(&sh),
+        ["ffi-tests"] => ffi_tests::run(&sh),
+        ["header"] => header::header(&sh, false),
+        ["header", "--check"] => header::header(&sh, true),
+        ["install", arguments @ ..] => install::install(&sh, arguments),
+        ["test"] => test::test(&sh),
+        ["wheel"] => wheel::wheel(&sh).map(drop),
+        ["validate"] => validate::validate(&sh),
+        [] | ["help" | "-h" | "--help"] => {
+            print!("{HELP}");
+            Ok(())
+        }
+        other => bail!("there is no task `{}`\n\n{HELP}", other.join(" ")),
+    }
+}

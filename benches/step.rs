@@ -1,0 +1,108 @@
+//! One right-hand side and one time step: time per directed neighbour pair (`Throughput::Elements`).
+//!
+//! A column of 17 x 97 x 17 particles in the middle of a twist. `cargo bench --bench step`.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use urlsph::{Scene, Simulation};
+
+const SCENE: &str = include_str!("../examples/column_twisting/scene.json");
+
+/// The twisted column after a few steps, at a spacing.
+fn column(spacing: f64, threads: usize, overrides: &[&str]) -> Simulation {
+    let mut all = vec![format!("geometry.box.spacing={spacing}")];
+    all.extend(overrides.iter().map(|o| (*o).to_string()));
+    let scene = Scene::from_json(SCENE, &all).expect("the example is a scene");
+    let mut simulation = Simulation::with_threads(scene, threads).expect("it can be set up");
+    let few = 5.0 * simulation.stable_step();
+    simulation.advance(few).expect("it runs");
+    simulation
+}
+
+fn right_hand_side(c: &mut Criterion) {
+    let mut group = c.benchmark_group("right-hand side, 28,033 particles");
+    for threads in [1, 2] {
+        let mut simulation = column(0.0625, threads, &[]);
+        group.throughput(Throughput::Elements(simulation.pair_count() as u64));
+        group.bench_function(BenchmarkId::new("threads", threads), |b| {
+            b.iter(|| black_box(simulation.evaluate()));
+        });
+        println!(
+            "{} bytes per particle",
+            simulation.memory() / simulation.particle_count()
+        );
+    }
+    group.finish();
+}
+
+/// What an option costs where it is on; where it is off it costs nothing, since the loops are
+/// compiled without it.
+fn options(c: &mut Criterion) {
+    let cases: &[(&str, &[&str])] = &[
+        ("default", &[]),
+        ("without dissipation", &["numerics.dissipation=false"]),
+        ("first order", &["numerics.reconstruction=none"]),
+        ("minmod", &["numerics.limiter=minmod"]),
+        ("venkatakrishnan", &["numerics.limiter=venkatakrishnan"]),
+        ("state {f, j}", &["numerics.state=fj"]),
+        ("state {f, h, j}", &["numerics.state=fhj"]),
+        (
+            "D^j",
+            &["numerics.state=fj", "numerics.volume_dissipation=0.05"],
+        ),
+        (
+            "angular-momentum projection",
+            &["numerics.angular_momentum_projection=true"],
+        ),
+        (
+            "update every step, option 1",
+            &["numerics.reference_update=every_step"],
+        ),
+        (
+            "update every step, option 2",
+            &[
+                "numerics.reference_update=every_step",
+                "numerics.kernel_option=2",
+            ],
+        ),
+        (
+            "update every step, option 3",
+            &[
+                "numerics.reference_update=every_step",
+                "numerics.kernel_option=3",
+            ],
+        ),
+        (
+            "update every step, option 4",
+            &[
+                "numerics.reference_update=every_step",
+                "numerics.kernel_option=4",
+            ],
+        ),
+        ("26 neighbours", &["numerics.neighbours=26"]),
+        ("6 neighbours", &["numerics.neighbours=6"]),
+    ];
+    let mut group = c.benchmark_group("step, 3,969 particles, 1 thread");
+    for (name, overrides) in cases {
+        let mut simulation = column(0.125, 1, overrides);
+        // Three right-hand sides a step.
+        group.throughput(Throughput::Elements(3 * simulation.pair_count() as u64));
+        let dt = 1e-3 * simulation.stable_step();
+        group.bench_function(*name, |b| {
+            b.iter(|| {
+                simulation
+                    .advance(simulation.time() + dt)
+                    .expect("a short step")
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20);
+    targets = right_hand_side, options
+}
+criterion_main!(benches);

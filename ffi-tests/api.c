@@ -1,0 +1,966 @@
+/* The contract of the C ABI: every function, and every way in which a call can be wrong. */
+
+#include <dirent.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include <urlsph.h>
+
+#include "check.h"
+
+/* The scene's file, the first argument of the program. */
+static const char *scene_path;
+
+static const double nan_ = NAN;
+static const double inf_ = INFINITY;
+
+/* An overlong struct, as of a later version of the library. */
+#define LATER(type)         \
+    struct {                \
+        type now;           \
+        unsigned char later[16]; \
+    }
+
+static urlsph_simulation *create(const char *override, size_t threads) {
+    urlsph_options options = {0};
+    options.overrides = override ? &override : NULL;
+    options.override_count = override ? 1 : 0;
+    options.threads = threads;
+    urlsph_simulation *s = NULL;
+    urlsph_error error;
+    if (urlsph_create_from_file(scene_path, &options, sizeof options, &s, &error, sizeof error) !=
+        URLSPH_OK) {
+        printf("    %s\n", error.text);
+    }
+    return s;
+}
+
+static uint64_t hash(const urlsph_simulation *s) {
+    uint64_t h = 0;
+    return urlsph_get_state_hash(s, &h) == URLSPH_OK ? h : 0;
+}
+
+static urlsph_error last(const urlsph_simulation *s) {
+    urlsph_error e;
+    memset(&e, 0xff, sizeof e);
+    urlsph_get_last_error(s, &e, sizeof e);
+    return e;
+}
+
+static size_t patch(const urlsph_simulation *s, const char *name) {
+    size_t i = SIZE_MAX;
+    urlsph_find_patch(s, name, &i);
+    return i;
+}
+
+static size_t field(const urlsph_simulation *s, const char *name) {
+    size_t i = SIZE_MAX;
+    urlsph_find_field(s, name, &i);
+    return i;
+}
+
+/* What was wrong is told by status and by text. */
+#define FAILS(call, status)            \
+    do {                               \
+        CHECK((call) == (status));     \
+        CHECK(last(s).code == (status)); \
+        CHECK(last(s).text[0] != 0);   \
+    } while (0)
+#define INVALID(call) FAILS(call, URLSPH_INVALID_ARGUMENT)
+
+static void versions(void) {
+    CHECK(strcmp(urlsph_version(), URLSPH_VERSION) == 0);
+    CHECK(urlsph_abi_version() == URLSPH_ABI_VERSION);
+    char version[32];
+    snprintf(version, sizeof version, "%d.%d.%d", URLSPH_VERSION_MAJOR, URLSPH_VERSION_MINOR,
+             URLSPH_VERSION_PATCH);
+    CHECK(strcmp(version, URLSPH_VERSION) == 0);
+    for (int32_t status = URLSPH_OK; status <= URLSPH_INTERNAL; ++status) {
+        CHECK(strlen(urlsph_status_text(status)) > 1);
+        CHECK(strcmp(urlsph_status_text(status), "unknown status") != 0);
+    }
+    CHECK(strcmp(urlsph_status_text(-1), "unknown status") == 0);
+    CHECK(strcmp(urlsph_status_text(INT32_MAX), "unknown status") == 0);
+}
+
+static void creation_from_text(void) {
+    FILE *file = fopen(scene_path, "rb");
+    CHECK(file);
+    char json[8192];
+    size_t length = fread(json, 1, sizeof json - 1, file);
+    fclose(file);
+    json[length] = 0;
+
+    urlsph_simulation *s = NULL;
+    CHECK(urlsph_create_from_json(json, NULL, 0, &s, NULL, 0) == URLSPH_OK);
+    const char *title = NULL;
+    CHECK(urlsph_get_title(s, &title) == URLSPH_OK);
+    CHECK(strcmp(title, "Test column") == 0);
+    CHECK(last(s).code == URLSPH_OK && last(s).text[0] == 0);
+    urlsph_simulation *same = create(NULL, 1);
+    CHECK(hash(s) == hash(same) && hash(s) != 0);
+    CHECK(urlsph_destroy(same) == URLSPH_OK);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void creation_fails(void) {
+    urlsph_simulation *s = (urlsph_simulation *)&s;
+    urlsph_error e;
+    const urlsph_simulation *none = NULL;
+
+#define WRONG(call, status)                                    \
+    do {                                                       \
+        s = (urlsph_simulation *)&s;                           \
+        memset(&e, 0xff, sizeof e);                            \
+        CHECK((call) == (status));                             \
+        CHECK(s == none);                                      \
+        CHECK(e.code == (status));                             \
+        CHECK(strlen(e.text) > 10 && strlen(e.text) < sizeof e.text); \
+    } while (0)
+#define JSON(text) urlsph_create_from_json(text, NULL, 0, &s, &e, sizeof e)
+#define FROM(path) urlsph_create_from_file(path, NULL, 0, &s, &e, sizeof e)
+
+    WRONG(JSON(NULL), URLSPH_INVALID_ARGUMENT);
+    WRONG(JSON("\xff\xfe"), URLSPH_INVALID_ARGUMENT);
+    CHECK(strstr(e.text, "json"));
+    WRONG(JSON(""), URLSPH_PARSE);
+    WRONG(JSON("{"), URLSPH_PARSE);
+    WRONG(JSON("[]"), URLSPH_PARSE);
+    WRONG(FROM(NULL), URLSPH_INVALID_ARGUMENT);
+    WRONG(FROM("\xff"), URLSPH_INVALID_ARGUMENT);
+    WRONG(FROM("no/such/file.json"), URLSPH_IO);
+    CHECK(strstr(e.text, "no/such/file.json"));
+    WRONG(FROM("."), URLSPH_IO);
+    WRONG(FROM(""), URLSPH_IO);
+
+    urlsph_options o = {0};
+    const char *overrides[] = {"material.neo_hookean.density=-1", NULL};
+    o.overrides = overrides;
+    o.override_count = 1;
+#define OPTIONS(size) urlsph_create_from_file(scene_path, &o, size, &s, &e, sizeof e)
+    WRONG(OPTIONS(sizeof o), URLSPH_INVALID_SCENE);
+    CHECK(strcmp(e.path, "material.neo_hookean.density") == 0);
+    CHECK(!e.has_particle && !e.has_position && !e.has_time);
+    overrides[0] = "nothing.of.this=1";
+    WRONG(OPTIONS(sizeof o), e.code);
+    CHECK(e.code == URLSPH_PARSE || e.code == URLSPH_INVALID_SCENE);
+    o.override_count = 2;
+    WRONG(OPTIONS(sizeof o), URLSPH_INVALID_ARGUMENT);
+    CHECK(strstr(e.text, "overrides[1]"));
+    o.override_count = SIZE_MAX;
+    WRONG(OPTIONS(sizeof o), URLSPH_INVALID_ARGUMENT);
+    o.overrides = NULL;
+    o.override_count = 1;
+    WRONG(OPTIONS(sizeof o), URLSPH_INVALID_ARGUMENT);
+    o.override_count = 0;
+    WRONG(OPTIONS(0), URLSPH_INVALID_ARGUMENT);
+    WRONG(OPTIONS(sizeof(void *)), URLSPH_INVALID_ARGUMENT);
+    o.threads = SIZE_MAX;
+    WRONG(OPTIONS(sizeof o), URLSPH_INVALID_ARGUMENT);
+
+    /* A later version's options are fine as long as they ask for nothing that is unknown here. */
+    LATER(urlsph_options) later;
+    memset(&later, 0, sizeof later);
+    CHECK(urlsph_create_from_file(scene_path, &later.now, sizeof later, &s, &e, sizeof e) ==
+          URLSPH_OK);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+    later.later[3] = 1;
+    WRONG(urlsph_create_from_file(scene_path, &later.now, sizeof later, &s, &e, sizeof e),
+          URLSPH_INVALID_ARGUMENT);
+
+    /* Where the error should go is wrong itself: the status remains. */
+    CHECK(urlsph_create_from_json("{", NULL, 0, NULL, &e, sizeof e) == URLSPH_INVALID_ARGUMENT);
+    CHECK(urlsph_create_from_json("{", NULL, 0, &s, &e, 3) == URLSPH_INVALID_ARGUMENT);
+    CHECK(urlsph_create_from_json("{", NULL, 0, &s, NULL, 0) == URLSPH_PARSE);
+    CHECK(s == NULL);
+#undef WRONG
+#undef JSON
+#undef FROM
+#undef OPTIONS
+}
+
+/* Calls everything with one handle, and all else as it should be. */
+static bool all_give(urlsph_simulation *s, urlsph_status wanted) {
+    bool same = true;
+    double d[1024], values[3] = {0};
+    size_t n = 0, particles[64];
+    uint64_t u = 0;
+    uint8_t bytes[1] = {0};
+    const char *text = NULL;
+    urlsph_counts counts;
+    urlsph_energies energies;
+    urlsph_momenta momenta;
+    urlsph_patch_info patch_info;
+    urlsph_resultant resultant;
+    urlsph_field_info field_info;
+    urlsph_view view;
+    urlsph_probe_info probe_info;
+    urlsph_probe_motion motion;
+    urlsph_input_info input_info;
+#define GIVES(call)                                                             \
+    do {                                                                        \
+        const urlsph_status status = (call);                                    \
+        if (status != wanted) {                                                 \
+            printf("    %s gives %s\n", #call, urlsph_status_text(status));     \
+            same = false;                                                       \
+        }                                                                       \
+    } while (0)
+    GIVES(urlsph_set_callbacks(s, NULL, 0));
+    GIVES(urlsph_get_title(s, &text));
+    GIVES(urlsph_get_counts(s, &counts, sizeof counts));
+    GIVES(urlsph_get_time(s, d));
+    GIVES(urlsph_get_end_time(s, d));
+    GIVES(urlsph_get_stable_step(s, d));
+    GIVES(urlsph_get_energies(s, &energies, sizeof energies));
+    GIVES(urlsph_get_momenta(s, &momenta, sizeof momenta));
+    GIVES(urlsph_find_patch(s, "top", &n));
+    GIVES(urlsph_get_patch_info(s, 0, &patch_info, sizeof patch_info));
+    GIVES(urlsph_read_patch_particles(s, 0, particles, 64));
+    GIVES(urlsph_read_patch_areas(s, 0, d, 1024));
+    GIVES(urlsph_read_patch_normals(s, 0, d, 1024));
+    GIVES(urlsph_get_resultant(s, 0, &resultant, sizeof resultant));
+    GIVES(urlsph_find_field(s, "velocity", &n));
+    GIVES(urlsph_get_field_info(s, 0, &field_info, sizeof field_info));
+    GIVES(urlsph_read_field(s, 0, d, 1024));
+    GIVES(urlsph_get_view(s, 0, &view, sizeof view));
+    GIVES(urlsph_get_generation(s, &u));
+    GIVES(urlsph_find_probe(s, "corner", &n));
+    GIVES(urlsph_get_probe_info(s, 0, &probe_info, sizeof probe_info));
+    GIVES(urlsph_get_probe_motion(s, 0, &motion, sizeof motion));
+    GIVES(urlsph_get_input_info(s, 0, &input_info, sizeof input_info));
+    GIVES(urlsph_get_snapshot_size(s, &n));
+    GIVES(urlsph_get_state_hash(s, &u));
+    if (wanted != URLSPH_OK) {
+        GIVES(urlsph_set_traction(s, 0, values, 3));
+        GIVES(urlsph_set_pressure(s, 0, values, 1));
+        GIVES(urlsph_set_velocity(s, 0, values, 3));
+        GIVES(urlsph_read_input(s, 0, URLSPH_TRACTION, d, 1024, &n));
+        GIVES(urlsph_step(s, 1e-5));
+        GIVES(urlsph_advance_to(s, 1.0));
+        GIVES(urlsph_save_snapshot(s, bytes, 1, &n));
+        GIVES(urlsph_restore_snapshot(s, bytes, 1));
+    }
+#undef GIVES
+    return same;
+}
+
+static void handles(void) {
+    urlsph_error e;
+    CHECK(all_give(NULL, URLSPH_INVALID_ARGUMENT));
+    CHECK(urlsph_get_last_error(NULL, &e, sizeof e) == URLSPH_INVALID_ARGUMENT);
+    CHECK(urlsph_destroy(NULL) == URLSPH_OK);
+
+    urlsph_simulation *s = create(NULL, 1);
+    CHECK(s);
+    CHECK(all_give(s, URLSPH_OK));
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+    CHECK(all_give(s, URLSPH_INVALID_ARGUMENT));
+    CHECK(urlsph_get_last_error(s, &e, sizeof e) == URLSPH_INVALID_ARGUMENT);
+    CHECK(urlsph_destroy(s) == URLSPH_INVALID_ARGUMENT);
+
+    /* A stale handle does not meet the simulation that came after it. */
+    urlsph_simulation *next = create(NULL, 1);
+    CHECK(next && next != s);
+    CHECK(all_give(s, URLSPH_INVALID_ARGUMENT));
+    CHECK(urlsph_destroy(next) == URLSPH_OK);
+
+    /* Something else altogether. */
+    double other = 0.0;
+    CHECK(all_give((urlsph_simulation *)&other, URLSPH_INVALID_ARGUMENT));
+    CHECK(urlsph_destroy((urlsph_simulation *)&other) == URLSPH_INVALID_ARGUMENT);
+    CHECK(urlsph_destroy((urlsph_simulation *)((char *)&other + 1)) == URLSPH_INVALID_ARGUMENT);
+}
+
+static void null_outputs(void) {
+    urlsph_simulation *s = create(NULL, 1);
+    CHECK(s);
+    const uint64_t before = hash(s);
+    double d[1024];
+    size_t n;
+    uint8_t byte = 0;
+    INVALID(urlsph_get_title(s, NULL));
+    INVALID(urlsph_get_counts(s, NULL, sizeof(urlsph_counts)));
+    INVALID(urlsph_get_time(s, NULL));
+    INVALID(urlsph_get_end_time(s, NULL));
+    INVALID(urlsph_get_stable_step(s, NULL));
+    INVALID(urlsph_get_energies(s, NULL, sizeof(urlsph_energies)));
+    INVALID(urlsph_get_momenta(s, NULL, sizeof(urlsph_momenta)));
+    INVALID(urlsph_find_patch(s, "top", NULL));
+    INVALID(urlsph_find_patch(s, NULL, &n));
+    INVALID(urlsph_find_patch(s, "\xc3", &n));
+    INVALID(urlsph_get_patch_info(s, 0, NULL, sizeof(urlsph_patch_info)));
+    INVALID(urlsph_read_patch_particles(s, 0, NULL, 1024));
+    INVALID(urlsph_read_patch_areas(s, 0, NULL, 1024));
+    INVALID(urlsph_read_patch_normals(s, 0, NULL, 1024));
+    INVALID(urlsph_get_resultant(s, 0, NULL, sizeof(urlsph_resultant)));
+    INVALID(urlsph_find_field(s, "velocity", NULL));
+    INVALID(urlsph_find_field(s, NULL, &n));
+    INVALID(urlsph_get_field_info(s, 0, NULL, sizeof(urlsph_field_info)));
+    INVALID(urlsph_read_field(s, 0, NULL, 1024));
+    INVALID(urlsph_get_view(s, 0, NULL, sizeof(urlsph_view)));
+    INVALID(urlsph_get_generation(s, NULL));
+    INVALID(urlsph_find_probe(s, "corner", NULL));
+    INVALID(urlsph_find_probe(s, NULL, &n));
+    INVALID(urlsph_get_probe_info(s, 0, NULL, sizeof(urlsph_probe_info)));
+    INVALID(urlsph_get_probe_motion(s, 0, NULL, sizeof(urlsph_probe_motion)));
+    INVALID(urlsph_get_input_info(s, 0, NULL, sizeof(urlsph_input_info)));
+    INVALID(urlsph_set_traction(s, patch(s, "top"), NULL, 3));
+    INVALID(urlsph_set_pressure(s, patch(s, "side"), NULL, 1));
+    INVALID(urlsph_set_velocity(s, patch(s, "bottom"), NULL, 3));
+    INVALID(urlsph_read_input(s, patch(s, "top"), URLSPH_TRACTION, NULL, 1024, &n));
+    INVALID(urlsph_read_input(s, patch(s, "top"), URLSPH_TRACTION, d, 1024, NULL));
+    INVALID(urlsph_get_snapshot_size(s, NULL));
+    INVALID(urlsph_save_snapshot(s, NULL, SIZE_MAX, &n));
+    INVALID(urlsph_restore_snapshot(s, NULL, 100));
+    INVALID(urlsph_restore_snapshot(s, &byte, SIZE_MAX));
+    INVALID(urlsph_get_state_hash(s, NULL));
+    CHECK(urlsph_get_last_error(s, NULL, sizeof(urlsph_error)) == URLSPH_INVALID_ARGUMENT);
+    CHECK(strstr(last(s).text, "hash"));
+
+    /* Misaligned pointers. */
+    char *odd = (char *)d + 1;
+    INVALID(urlsph_get_time(s, (void *)odd));
+    INVALID(urlsph_read_field(s, 0, (void *)odd, 1000));
+    INVALID(urlsph_get_energies(s, (void *)odd, sizeof(urlsph_energies)));
+    INVALID(urlsph_set_traction(s, patch(s, "top"), (void *)odd, 3));
+    CHECK(hash(s) == before);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void struct_sizes(void) {
+    urlsph_simulation *s = create(NULL, 1);
+    CHECK(s);
+#define SIZES(call, type)                                                       \
+    do {                                                                        \
+        LATER(type) v;                                                          \
+        memset(&v, 0xaa, sizeof v);                                             \
+        INVALID(call(&v.now, 0));                                               \
+        INVALID(call(&v.now, 1));                                               \
+        INVALID(call(&v.now, sizeof v.now - sizeof(int64_t)));                  \
+        unsigned char *raw = (unsigned char *)&v;                               \
+        for (size_t i = 0; i < sizeof v; ++i) CHECK(raw[i] == 0xaa);            \
+        CHECK(call(&v.now, sizeof v) == URLSPH_OK);                             \
+        for (size_t i = 0; i < sizeof v.later; ++i) CHECK(v.later[i] == 0);     \
+        memset(&v, 0xaa, sizeof v);                                             \
+        CHECK(call(&v.now, sizeof v.now) == URLSPH_OK);                         \
+        for (size_t i = 0; i < sizeof v.later; ++i) CHECK(v.later[i] == 0xaa);  \
+    } while (0)
+#define COUNTS(p, n) urlsph_get_counts(s, p, n)
+#define ENERGIES(p, n) urlsph_get_energies(s, p, n)
+#define MOMENTA(p, n) urlsph_get_momenta(s, p, n)
+#define PATCH_INFO(p, n) urlsph_get_patch_info(s, 0, p, n)
+#define RESULTANT(p, n) urlsph_get_resultant(s, 0, p, n)
+#define FIELD_INFO(p, n) urlsph_get_field_info(s, 0, p, n)
+#define VIEW(p, n) urlsph_get_view(s, 0, p, n)
+#define PROBE_INFO(p, n) urlsph_get_probe_info(s, 0, p, n)
+#define MOTION(p, n) urlsph_get_probe_motion(s, 0, p, n)
+#define INPUT_INFO(p, n) urlsph_get_input_info(s, 0, p, n)
+    SIZES(COUNTS, urlsph_counts);
+    SIZES(ENERGIES, urlsph_energies);
+    SIZES(MOMENTA, urlsph_momenta);
+    SIZES(PATCH_INFO, urlsph_patch_info);
+    SIZES(RESULTANT, urlsph_resultant);
+    SIZES(FIELD_INFO, urlsph_field_info);
+    SIZES(VIEW, urlsph_view);
+    SIZES(PROBE_INFO, urlsph_probe_info);
+    SIZES(MOTION, urlsph_probe_motion);
+    SIZES(INPUT_INFO, urlsph_input_info);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void patches(void) {
+    urlsph_simulation *s = create(NULL, 2);
+    CHECK(s);
+    urlsph_counts counts;
+    CHECK(urlsph_get_counts(s, &counts, sizeof counts) == URLSPH_OK);
+    CHECK(counts.particles == 3 * 5 * 3 && counts.pairs > counts.particles);
+    CHECK(counts.steps == 0 && counts.threads == 2 && counts.probes == 2 && counts.inputs == 3);
+    CHECK(counts.patches >= 9);
+
+    size_t top = SIZE_MAX;
+    CHECK(urlsph_find_patch(s, "top", &top) == URLSPH_OK);
+    urlsph_patch_info info;
+    CHECK(urlsph_get_patch_info(s, top, &info, sizeof info) == URLSPH_OK);
+    CHECK(strcmp(info.name, "top") == 0 && info.particles == 9);
+    CHECK_NEAR(info.area, 1.0, 1e-14);
+
+    size_t particles[9];
+    double areas[9], normals[27], *initial = malloc(3 * counts.particles * sizeof *initial);
+    CHECK(initial);
+    CHECK(urlsph_read_patch_particles(s, top, particles, 9) == URLSPH_OK);
+    CHECK(urlsph_read_patch_areas(s, top, areas, 9) == URLSPH_OK);
+    CHECK(urlsph_read_patch_normals(s, top, normals, 27) == URLSPH_OK);
+    CHECK(urlsph_read_field(s, field(s, "initial_position"), initial, 3 * counts.particles) ==
+          URLSPH_OK);
+    double sum = 0.0;
+    for (size_t i = 0; i < 9; ++i) {
+        CHECK(particles[i] < counts.particles && (i == 0 || particles[i] > particles[i - 1]));
+        CHECK(initial[3 * particles[i] + 1] == 2.0);
+        CHECK(normals[3 * i] == 0.0 && normals[3 * i + 1] == 1.0 && normals[3 * i + 2] == 0.0);
+        sum += areas[i];
+    }
+    CHECK_NEAR(sum, 1.0, 1e-14);
+    free(initial);
+
+    /* Too small by one, and not touched. */
+    particles[8] = 77;
+    areas[8] = 77.0;
+    INVALID(urlsph_read_patch_particles(s, top, particles, 8));
+    INVALID(urlsph_read_patch_areas(s, top, areas, 8));
+    INVALID(urlsph_read_patch_normals(s, top, normals, 26));
+    CHECK(strstr(last(s).text, "26") && strstr(last(s).text, "27"));
+    CHECK(particles[8] == 77 && areas[8] == 77.0);
+
+    /* Out of range, unknown. */
+    INVALID(urlsph_get_patch_info(s, counts.patches, &info, sizeof info));
+    INVALID(urlsph_get_patch_info(s, SIZE_MAX, &info, sizeof info));
+    INVALID(urlsph_read_patch_particles(s, SIZE_MAX, particles, 9));
+    INVALID(urlsph_read_patch_areas(s, SIZE_MAX, areas, 9));
+    INVALID(urlsph_read_patch_normals(s, SIZE_MAX, normals, 27));
+    urlsph_resultant resultant;
+    INVALID(urlsph_get_resultant(s, counts.patches, &resultant, sizeof resultant));
+    INVALID(urlsph_find_patch(s, "tpo", &top));
+    CHECK(strstr(last(s).text, "top"));
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void fields(void) {
+    urlsph_simulation *s = create(NULL, 2);
+    CHECK(s);
+    const double pull[3] = {1e4, 2e4, 0.0};
+    CHECK(urlsph_set_traction(s, patch(s, "top"), pull, 3) == URLSPH_OK);
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+    urlsph_counts counts;
+    CHECK(urlsph_get_counts(s, &counts, sizeof counts) == URLSPH_OK);
+    double *values = malloc((9 * counts.particles + 1) * sizeof *values);
+    CHECK(values);
+    size_t views = 0;
+    for (size_t f = 0; f < counts.fields; ++f) {
+        urlsph_field_info info;
+        CHECK(urlsph_get_field_info(s, f, &info, sizeof info) == URLSPH_OK);
+        CHECK(info.components == 1 || info.components == 3 || info.components == 9);
+        CHECK(strlen(info.name) > 0 && strlen(info.unit) > 0 && strlen(info.description) > 0);
+        CHECK(info.configuration >= URLSPH_CONFIGURATION_INITIAL &&
+              info.configuration <= URLSPH_CONFIGURATION_TWO_POINT);
+        size_t found;
+        CHECK(urlsph_find_field(s, info.name, &found) == URLSPH_OK && found == f);
+
+        const size_t needed = counts.particles * info.components;
+        INVALID(urlsph_read_field(s, f, values, needed - 1));
+        INVALID(urlsph_read_field(s, f, values, 0));
+        values[needed] = 77.0;
+        CHECK(urlsph_read_field(s, f, values, 9 * counts.particles + 1) == URLSPH_OK);
+        CHECK(values[needed] == 77.0);
+        for (size_t i = 0; i < needed; ++i) CHECK(isfinite(values[i]));
+
+        urlsph_view view;
+        if (!info.has_view) {
+            INVALID(urlsph_get_view(s, f, &view, sizeof view));
+            CHECK(strcmp(last(s).field, info.name) == 0);
+            continue;
+        }
+        ++views;
+        CHECK(urlsph_get_view(s, f, &view, sizeof view) == URLSPH_OK);
+        CHECK(view.particles == counts.particles && view.components == info.components);
+        CHECK(view.component_stride >= view.particles);
+        for (size_t slot = 0; slot < view.particles; ++slot) {
+            for (size_t c = 0; c < view.components; ++c) {
+                CHECK(view.data[c * view.component_stride + slot] ==
+                      values[view.order[slot] * view.components + c]);
+            }
+        }
+        uint64_t generation;
+        CHECK(urlsph_get_generation(s, &generation) == URLSPH_OK);
+        CHECK(generation == view.generation);
+    }
+    CHECK(views >= 3);
+    uint64_t before, after;
+    CHECK(urlsph_get_generation(s, &before) == URLSPH_OK);
+    CHECK(urlsph_step(s, 1e-5) == URLSPH_OK);
+    CHECK(urlsph_get_generation(s, &after) == URLSPH_OK);
+    CHECK(after != before);
+
+    urlsph_field_info info;
+    urlsph_view view;
+    size_t n;
+    INVALID(urlsph_get_field_info(s, counts.fields, &info, sizeof info));
+    INVALID(urlsph_read_field(s, SIZE_MAX, values, 9 * counts.particles));
+    INVALID(urlsph_get_view(s, counts.fields, &view, sizeof view));
+    INVALID(urlsph_find_field(s, "temperature", &n));
+    CHECK(strstr(last(s).text, "cauchy_stress"));
+    free(values);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void inputs(void) {
+    urlsph_simulation *s = create(NULL, 2);
+    CHECK(s);
+    bool seen[4] = {false};
+    for (size_t i = 0; i < 3; ++i) {
+        urlsph_input_info info;
+        CHECK(urlsph_get_input_info(s, i, &info, sizeof info) == URLSPH_OK);
+        seen[info.quantity] = true;
+        const bool pressure = info.quantity == URLSPH_PRESSURE;
+        CHECK(info.components == (pressure ? 1 : 3));
+        CHECK(info.particles == (pressure ? 15 : 9));
+        CHECK(info.per_particle == (info.quantity == URLSPH_TRACTION));
+    }
+    CHECK(seen[URLSPH_TRACTION] && seen[URLSPH_PRESSURE] && seen[URLSPH_VELOCITY]);
+    urlsph_input_info info;
+    INVALID(urlsph_get_input_info(s, 3, &info, sizeof info));
+
+    const size_t top = patch(s, "top"), side = patch(s, "side"), bottom = patch(s, "bottom");
+    double values[45], back[45];
+    size_t count;
+    for (int i = 0; i < 45; ++i) values[i] = 100.0 * i;
+
+    /* One for the patch, one per particle; what was set is read back. */
+    CHECK(urlsph_set_traction(s, top, values, 3) == URLSPH_OK);
+    CHECK(urlsph_set_traction(s, top, values, 27) == URLSPH_OK);
+    CHECK(urlsph_read_input(s, top, URLSPH_TRACTION, back, 27, &count) == URLSPH_OK);
+    CHECK(count == 27 && memcmp(back, values, sizeof(double[27])) == 0);
+    CHECK(urlsph_set_pressure(s, side, values, 15) == URLSPH_OK);
+    CHECK(urlsph_set_pressure(s, side, values + 7, 1) == URLSPH_OK);
+    CHECK(urlsph_read_input(s, side, URLSPH_PRESSURE, back, 45, &count) == URLSPH_OK);
+    CHECK(back[0] == 700.0);
+    CHECK(urlsph_set_velocity(s, bottom, values, 27) == URLSPH_OK);
+    CHECK(urlsph_set_velocity(s, bottom, values, 3) == URLSPH_OK);
+
+    const uint64_t before = hash(s);
+    INVALID(urlsph_set_traction(s, top, values, 0));
+    INVALID(urlsph_set_traction(s, top, values, 1));
+    INVALID(urlsph_set_traction(s, top, values, 9));
+    INVALID(urlsph_set_traction(s, top, values, 28));
+    INVALID(urlsph_set_traction(s, top, values, SIZE_MAX));
+    INVALID(urlsph_set_traction(s, side, values, 3));
+    INVALID(urlsph_set_traction(s, SIZE_MAX, values, 3));
+    INVALID(urlsph_set_pressure(s, side, values, 3));
+    INVALID(urlsph_set_pressure(s, top, values, 1));
+    INVALID(urlsph_set_velocity(s, bottom, values, 2));
+    INVALID(urlsph_set_velocity(s, top, values, 3));
+    values[26] = nan_;
+    INVALID(urlsph_set_traction(s, top, values, 27));
+    values[26] = inf_;
+    INVALID(urlsph_set_traction(s, top, values, 27));
+    INVALID(urlsph_read_input(s, top, URLSPH_TRACTION, back, 26, &count));
+    INVALID(urlsph_read_input(s, top, URLSPH_VELOCITY, back, 45, &count));
+    INVALID(urlsph_read_input(s, top, 0, back, 45, &count));
+    INVALID(urlsph_read_input(s, top, -7, back, 45, &count));
+    INVALID(urlsph_read_input(s, SIZE_MAX, URLSPH_TRACTION, back, 45, &count));
+    CHECK(hash(s) == before);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void time_step(void) {
+    urlsph_simulation *s = create(NULL, 2);
+    CHECK(s);
+    double time, end, dt;
+    CHECK(urlsph_get_time(s, &time) == URLSPH_OK && time == 0.0);
+    CHECK(urlsph_get_end_time(s, &end) == URLSPH_OK && end == 0.01);
+    CHECK(urlsph_get_stable_step(s, &dt) == URLSPH_OK && dt > 0.0 && dt < 1.0);
+
+    /* Many stable steps, a fraction of one, and exactly the end that was asked for. */
+    CHECK(urlsph_step(s, 0.1) == URLSPH_OK);
+    CHECK(urlsph_get_time(s, &time) == URLSPH_OK && time == 0.1);
+    urlsph_counts counts;
+    CHECK(urlsph_get_counts(s, &counts, sizeof counts) == URLSPH_OK && counts.steps > 2);
+    CHECK(urlsph_step(s, 0.3 * dt) == URLSPH_OK);
+    CHECK(urlsph_get_time(s, &time) == URLSPH_OK && time == 0.1 + 0.3 * dt);
+    CHECK(urlsph_advance_to(s, 0.107) == URLSPH_OK);
+    CHECK(urlsph_get_time(s, &time) == URLSPH_OK && time == 0.107);
+
+    const uint64_t before = hash(s);
+    INVALID(urlsph_step(s, 0.0));
+    INVALID(urlsph_step(s, -1e-3));
+    INVALID(urlsph_step(s, nan_));
+    INVALID(urlsph_step(s, inf_));
+    INVALID(urlsph_step(s, 1e-30));
+    CHECK(last(s).has_time && last(s).time == 0.107);
+    INVALID(urlsph_advance_to(s, 0.107));
+    INVALID(urlsph_advance_to(s, 0.0));
+    INVALID(urlsph_advance_to(s, nan_));
+    INVALID(urlsph_advance_to(s, inf_));
+    INVALID(urlsph_advance_to(s, -inf_));
+    CHECK(hash(s) == before);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void resultants(void) {
+    urlsph_simulation *s = create(NULL, 2);
+    CHECK(s);
+    const size_t top = patch(s, "top");
+    const double pull[3] = {1e4, 0.0, -3e3};
+    CHECK(urlsph_set_traction(s, top, pull, 3) == URLSPH_OK);
+    CHECK(urlsph_step(s, 2e-3) == URLSPH_OK);
+    urlsph_resultant r;
+    CHECK(urlsph_get_resultant(s, top, &r, sizeof r) == URLSPH_OK);
+    /* A dead traction on 1 m^2. */
+    CHECK_NEAR(r.force[0], 1e4, 1e-8);
+    CHECK_NEAR(r.force[1], 0.0, 1e-8);
+    CHECK_NEAR(r.force[2], -3e3, 1e-8);
+    CHECK(r.mean_displacement[0] > 0.0 && r.mean_velocity[0] > 0.0);
+
+    size_t corner;
+    CHECK(urlsph_find_probe(s, "corner", &corner) == URLSPH_OK);
+    urlsph_probe_info info;
+    CHECK(urlsph_get_probe_info(s, corner, &info, sizeof info) == URLSPH_OK);
+    CHECK(strcmp(info.name, "corner") == 0 && info.position[1] == 2.0);
+    urlsph_probe_motion m;
+    CHECK(urlsph_get_probe_motion(s, corner, &m, sizeof m) == URLSPH_OK);
+    CHECK(m.displacement[0] > 0.0 && m.velocity[0] > 0.0);
+    INVALID(urlsph_get_probe_info(s, 2, &info, sizeof info));
+    INVALID(urlsph_get_probe_motion(s, SIZE_MAX, &m, sizeof m));
+    INVALID(urlsph_find_probe(s, "center", &corner));
+    CHECK(strstr(last(s).text, "middle"));
+
+    urlsph_energies e;
+    urlsph_momenta p;
+    CHECK(urlsph_get_energies(s, &e, sizeof e) == URLSPH_OK);
+    CHECK(e.kinetic > 0.0 && e.strain > 0.0 && e.external_work > 0.0);
+    CHECK(e.numerical_dissipation >= 0.0);
+    CHECK_NEAR(e.closure_error, 0.0, 1e-2 * e.external_work);
+    CHECK(urlsph_get_momenta(s, &p, sizeof p) == URLSPH_OK);
+    CHECK(p.linear[0] > 0.0 && isfinite(p.angular[2]));
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+static void snapshots(void) {
+    urlsph_simulation *s = create(NULL, 2), *other = create("title=\"Another\"", 1);
+    CHECK(s && other);
+    const double pull[3] = {1e4, 0.0, 0.0}, push[3] = {-5e4, 0.0, 0.0};
+    const size_t top = patch(s, "top");
+    CHECK(urlsph_set_traction(s, top, pull, 3) == URLSPH_OK);
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+
+    size_t size, written = 0;
+    CHECK(urlsph_get_snapshot_size(s, &size) == URLSPH_OK && size > 0);
+    uint8_t *bytes = malloc(size + 1);
+    CHECK(bytes);
+    bytes[size] = 77;
+    INVALID(urlsph_save_snapshot(s, bytes, size - 1, &written));
+    INVALID(urlsph_save_snapshot(s, bytes, 0, &written));
+    CHECK(written == 0);
+    CHECK(urlsph_save_snapshot(s, bytes, size + 1, &written) == URLSPH_OK);
+    CHECK(written == size && bytes[size] == 77);
+    const uint64_t saved = hash(s);
+
+    /* Away, with another input, and back. */
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+    const uint64_t once = hash(s);
+    CHECK(urlsph_set_traction(s, top, push, 3) == URLSPH_OK);
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+    CHECK(urlsph_restore_snapshot(s, bytes, size) == URLSPH_OK);
+    CHECK(hash(s) == saved);
+    double time;
+    CHECK(urlsph_get_time(s, &time) == URLSPH_OK && time == 1e-3);
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+    CHECK(hash(s) == once);
+
+    /* The size that was asked for is that of the state at the copy. */
+    CHECK(urlsph_get_snapshot_size(s, &size) == URLSPH_OK);
+    CHECK(urlsph_step(s, 1e-4) == URLSPH_OK);
+    uint8_t *late = malloc(size);
+    CHECK(late);
+    CHECK(urlsph_save_snapshot(s, late, size, &written) == URLSPH_OK);
+    const uint64_t there = hash(s);
+    CHECK(urlsph_restore_snapshot(s, bytes, written) == URLSPH_OK);
+    CHECK(urlsph_restore_snapshot(s, late, written) == URLSPH_OK);
+    CHECK(hash(s) == there);
+    free(late);
+
+    /* Into another simulation of the same scene, with another number of threads. */
+    urlsph_simulation *twin = create(NULL, 3);
+    CHECK(twin);
+    CHECK(urlsph_restore_snapshot(twin, bytes, size) == URLSPH_OK);
+    CHECK(urlsph_step(twin, 1e-3) == URLSPH_OK);
+    CHECK(hash(twin) == once);
+    CHECK(urlsph_destroy(twin) == URLSPH_OK);
+
+    /* Not a usable snapshot: nothing happens. */
+    const uint64_t before = hash(s);
+    FAILS(urlsph_restore_snapshot(s, bytes, 0), URLSPH_SNAPSHOT);
+    FAILS(urlsph_restore_snapshot(s, NULL, 0), URLSPH_SNAPSHOT);
+    FAILS(urlsph_restore_snapshot(s, bytes, 7), URLSPH_SNAPSHOT);
+    FAILS(urlsph_restore_snapshot(s, bytes, size - 1), URLSPH_SNAPSHOT);
+    FAILS(urlsph_restore_snapshot(s, bytes, size + 1), URLSPH_SNAPSHOT);
+    for (size_t i = 0; i < size; i += 97) {
+        bytes[i] ^= 0x10;
+        FAILS(urlsph_restore_snapshot(s, bytes, size), URLSPH_SNAPSHOT);
+        bytes[i] ^= 0x10;
+    }
+    CHECK(hash(s) == before);
+    CHECK(urlsph_restore_snapshot(other, bytes, size) == URLSPH_SNAPSHOT);
+    CHECK(last(other).code == URLSPH_SNAPSHOT);
+    free(bytes);
+    CHECK(urlsph_destroy(other) == URLSPH_OK);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+/* What the callbacks of a test share. */
+struct witness {
+    urlsph_simulation *s;
+    pthread_t thread;
+    int progress, asked, errors, infos, cancel_at;
+    bool wrong_thread, wrong_order, not_busy;
+    double time, end;
+};
+
+static void on_log(urlsph_log_level level, const char *message, void *user_data) {
+    struct witness *w = user_data;
+    if (!pthread_equal(pthread_self(), w->thread)) w->wrong_thread = true;
+    if (strlen(message) > 0) ++*(level == URLSPH_LOG_ERROR ? &w->errors : &w->infos);
+}
+
+static void on_progress(const urlsph_progress *p, void *user_data) {
+    struct witness *w = user_data;
+    ++w->progress;
+    if (!pthread_equal(pthread_self(), w->thread)) w->wrong_thread = true;
+    if (!(p->time > w->time && p->dt > 0.0 && p->steps == (uint64_t)w->progress)) {
+        w->wrong_order = true;
+    }
+    w->time = p->time;
+    w->end = p->end;
+    if (w->progress == 1 && !(all_give(w->s, URLSPH_BUSY) && urlsph_destroy(w->s) == URLSPH_BUSY)) {
+        w->not_busy = true;
+    }
+}
+
+static int32_t on_cancel(void *user_data) {
+    struct witness *w = user_data;
+    if (!pthread_equal(pthread_self(), w->thread)) w->wrong_thread = true;
+    return ++w->asked == w->cancel_at;
+}
+
+static void callbacks(void) {
+    urlsph_simulation *s = create(NULL, 3), *quiet = create(NULL, 3);
+    CHECK(s && quiet);
+    struct witness w = {0};
+    w.s = s;
+    w.thread = pthread_self();
+    urlsph_callbacks c = {0};
+    c.user_data = &w;
+    c.log = on_log;
+    c.progress = on_progress;
+    c.cancel = on_cancel;
+    INVALID(urlsph_set_callbacks(s, &c, 0));
+    INVALID(urlsph_set_callbacks(s, &c, sizeof c - 1 - sizeof c.cancel));
+    CHECK(urlsph_set_callbacks(s, &c, sizeof c) == URLSPH_OK);
+
+    double dt;
+    CHECK(urlsph_get_stable_step(s, &dt) == URLSPH_OK);
+    const double end = 20.5 * dt;
+    CHECK(urlsph_advance_to(s, end) == URLSPH_OK);
+    CHECK(w.progress > 20 && w.asked == w.progress && w.time == end && w.end == end);
+    CHECK(!w.wrong_thread && !w.wrong_order && !w.not_busy);
+    CHECK(w.infos == 1 && w.errors == 0);
+
+    /* Watching changes nothing. */
+    CHECK(urlsph_advance_to(quiet, end) == URLSPH_OK);
+    CHECK(hash(s) == hash(quiet));
+
+    /* Cancelled after a step that stays; then on as if nothing had been, to the bit. */
+    w.cancel_at = w.asked + 2;
+    FAILS(urlsph_step(s, 100 * dt), URLSPH_CANCELLED);
+    CHECK(w.asked == w.cancel_at && w.errors == 1);
+    double time;
+    CHECK(urlsph_get_time(s, &time) == URLSPH_OK);
+    CHECK(time == w.time && time > end && time < end + 3 * dt);
+    CHECK(urlsph_step(s, dt) == URLSPH_OK);
+
+    /* Without callbacks again. */
+    const int progress = w.progress;
+    CHECK(urlsph_set_callbacks(s, NULL, 0) == URLSPH_OK);
+    CHECK(urlsph_step(s, dt) == URLSPH_OK);
+    CHECK(urlsph_step(s, -1.0) == URLSPH_INVALID_ARGUMENT);
+    CHECK(w.progress == progress && w.errors == 1);
+    CHECK(urlsph_destroy(quiet) == URLSPH_OK);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+/* A step that goes on until it is told to stop. */
+static atomic_bool running, stop;
+
+static void say_running(const urlsph_progress *p, void *user_data) {
+    (void)p;
+    (void)user_data;
+    atomic_store(&running, true);
+}
+
+static int32_t ask_stop(void *user_data) {
+    (void)user_data;
+    return atomic_load(&stop);
+}
+
+static void *endless(void *handle) {
+    const urlsph_status status = urlsph_advance_to(handle, 1e9);
+    atomic_store(&running, true);
+    return status == URLSPH_CANCELLED ? NULL : handle;
+}
+
+static void busy(void) {
+    urlsph_simulation *s = create(NULL, 2), *free_ = create(NULL, 1);
+    CHECK(s && free_);
+    urlsph_callbacks c = {0};
+    c.progress = say_running;
+    c.cancel = ask_stop;
+    CHECK(urlsph_set_callbacks(s, &c, sizeof c) == URLSPH_OK);
+    pthread_t thread;
+    CHECK(pthread_create(&thread, NULL, endless, s) == 0);
+    while (!atomic_load(&running)) {
+    }
+    const bool all_busy = all_give(s, URLSPH_BUSY);
+    const urlsph_status destroyed = urlsph_destroy(s);
+    urlsph_error e;
+    const urlsph_status asked = urlsph_get_last_error(s, &e, sizeof e);
+    /* Another simulation does not notice. */
+    const bool other_works = all_give(free_, URLSPH_OK);
+    atomic_store(&stop, true);
+    void *failed;
+    CHECK(pthread_join(thread, &failed) == 0);
+    CHECK(failed == NULL);
+    CHECK(all_busy && destroyed == URLSPH_BUSY && asked == URLSPH_BUSY && other_works);
+    CHECK(last(s).code == URLSPH_CANCELLED);
+    CHECK(all_give(s, URLSPH_OK));
+    CHECK(urlsph_destroy(free_) == URLSPH_OK);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+/* Threads that all want the same handle, or create and destroy their own, and one that destroys. */
+static _Atomic(urlsph_simulation *) shared;
+
+static void *hammer(void *unused) {
+    (void)unused;
+    for (int i = 0; i < 200; ++i) {
+        urlsph_simulation *s = atomic_load(&shared);
+        double time;
+        urlsph_status status = i % 10 ? urlsph_get_time(s, &time) : urlsph_step(s, 1e-5);
+        if (status != URLSPH_OK && status != URLSPH_BUSY && status != URLSPH_INVALID_ARGUMENT) {
+            return &shared;
+        }
+    }
+    return NULL;
+}
+
+static void *replace(void *unused) {
+    (void)unused;
+    for (int i = 0; i < 20; ++i) {
+        urlsph_simulation *next = create(NULL, 1);
+        urlsph_simulation *old = atomic_exchange(&shared, next);
+        urlsph_status status;
+        while ((status = urlsph_destroy(old)) == URLSPH_BUSY) {
+        }
+        if (!next || status != URLSPH_OK) return &shared;
+    }
+    return NULL;
+}
+
+static void many_threads(void) {
+    atomic_store(&shared, create(NULL, 1));
+    pthread_t threads[5];
+    for (int i = 0; i < 5; ++i) {
+        CHECK(pthread_create(&threads[i], NULL, i ? hammer : replace, NULL) == 0);
+    }
+    bool failed = false;
+    for (int i = 0; i < 5; ++i) {
+        void *outcome;
+        CHECK(pthread_join(threads[i], &outcome) == 0);
+        failed = failed || outcome;
+    }
+    CHECK(!failed);
+    CHECK(urlsph_destroy(atomic_load(&shared)) == URLSPH_OK);
+}
+
+static void number_of_threads(void) {
+    uint64_t first = 0;
+    const size_t threads[] = {1, 2, 3, 8};
+    for (int i = 0; i < 4; ++i) {
+        urlsph_simulation *s = create("geometry.box.spacing=0.125", threads[i]);
+        CHECK(s);
+        const double pull[3] = {1e5, 0.0, 0.0};
+        CHECK(urlsph_set_traction(s, patch(s, "top"), pull, 3) == URLSPH_OK);
+        CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+        if (i == 0) first = hash(s);
+        CHECK(hash(s) == first);
+        CHECK(urlsph_destroy(s) == URLSPH_OK);
+    }
+}
+
+/* Threads of this process; 0 where nobody tells. */
+static size_t threads_now(void) {
+    DIR *folder = opendir("/proc/self/task");
+    if (!folder) return 0;
+    size_t count = 0;
+    while (readdir(folder)) ++count;
+    closedir(folder);
+    return count;
+}
+
+/* A host may unload the library right after the last simulation: no thread may be left in its code. */
+static void threads_end(void) {
+    const size_t before = threads_now();
+    for (int i = 0; i < 20; ++i) {
+        urlsph_simulation *s = create(NULL, 8);
+        CHECK(s && urlsph_step(s, 1e-5) == URLSPH_OK);
+        CHECK(before == 0 || threads_now() == before + 8);
+        CHECK(urlsph_destroy(s) == URLSPH_OK);
+        /* The kernel may list a thread for a moment after it was waited for. */
+        const struct timespec moment = {0, 1000000};
+        for (int wait = 0; wait < 1000 && threads_now() != before; ++wait) nanosleep(&moment, NULL);
+        CHECK(threads_now() == before);
+    }
+}
+
+static void divergence(void) {
+    urlsph_simulation *s = create(NULL, 2);
+    CHECK(s);
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+    /* Pulls the column apart in a step or two. */
+    const double pull[27] = {[0] = 1e14, [13] = -1e14};
+    CHECK(urlsph_set_traction(s, patch(s, "top"), pull, 27) == URLSPH_OK);
+    FAILS(urlsph_step(s, 1.0), URLSPH_DIVERGED);
+    const urlsph_error e = last(s);
+    printf("    %s\n", e.text);
+    CHECK(e.has_particle && e.particle < 45);
+    CHECK(e.has_position && isfinite(e.position[0]));
+    CHECK(e.has_time && e.time >= 1e-3);
+    CHECK(e.field[0] != 0);
+
+    /* The last good state can be read. */
+    double values[405], time;
+    CHECK(urlsph_get_time(s, &time) == URLSPH_OK && time >= 1e-3 && time < 1.0);
+    CHECK(urlsph_read_field(s, field(s, "cauchy_stress"), values, 405) == URLSPH_OK);
+    for (int i = 0; i < 405; ++i) CHECK(isfinite(values[i]));
+    CHECK(all_give(s, URLSPH_OK));
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+int main(int argc, char **argv) {
+    if (argc != 2) {
+        fprintf(stderr, "usage: %s SCENE.json\n", argv[0]);
+        return 2;
+    }
+    scene_path = argv[1];
+    RUN(versions);
+    RUN(creation_from_text);
+    RUN(creation_fails);
+    RUN(handles);
+    RUN(null_outputs);
+    RUN(struct_sizes);
+    RUN(patches);
+    RUN(fields);
+    RUN(inputs);
+    RUN(time_step);
+    RUN(resultants);
+    RUN(snapshots);
+    RUN(callbacks);
+    RUN(busy);
+    RUN(many_threads);
+    RUN(number_of_threads);
+    RUN(threads_end);
+    RUN(divergence);
+    return check_summary();
+}

@@ -1,0 +1,219 @@
+//! `urlsph run`: from a scene to a folder of results, with a progress bar.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use urlsph::output::Recorder;
+use urlsph::{Code, Control, Energies, Error, Progress, Result, Simulation};
+
+use crate::SceneArguments;
+use crate::check::grouped;
+
+#[derive(Args)]
+pub struct Run {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Folder of the results, made if missing; an earlier run in it is replaced.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Threads; as many as the machine has cores unless given.
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    threads: usize,
+    /// End of the run [s]: the same as `--set time.end=T`.
+    #[arg(long, value_name = "T")]
+    until: Option<String>,
+    /// Prints errors only.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Run {
+    pub fn execute(mut self) -> Result<()> {
+        if let Some(end) = self.until.take() {
+            self.scene.overrides.push(format!("time.end={end}"));
+        }
+        let mut simulation = Simulation::with_threads(self.scene.load()?, self.threads)?;
+        let mut recorder = Recorder::create(&self.out, &simulation)?;
+        let interrupted = watch_interrupts()?;
+        let start = Instant::now();
+        let initial = simulation.energies();
+        let bar = Bar::new(&simulation, self.quiet);
+        let outcome = march(&mut simulation, &mut recorder, &bar, &interrupted);
+        bar.finish();
+        if let Err(error) = outcome {
+            return Err(Self::explain(error, &simulation, &mut recorder));
+        }
+        if !self.quiet {
+            crate::print(&summary(&simulation, &recorder, initial, start.elapsed()))?;
+        }
+        Ok(())
+    }
+
+    /// What became of a run that ended early: its last state is written, and the message says where.
+    fn explain(error: Error, simulation: &Simulation, recorder: &mut Recorder) -> Error {
+        if !matches!(error.code(), Code::Diverged | Code::Cancelled) {
+            return error;
+        }
+        match recorder.record_last_state(simulation) {
+            Ok(path) => error.with_note(&format!(
+                "the last good state, time {:.6e} s, is in {}",
+                simulation.time(),
+                path.display()
+            )),
+            Err(output) => error.with_note(&format!("its last good state is lost, too: {output}")),
+        }
+    }
+}
+
+/// Advances from one instant of output to the next, up to the scene's end.
+fn march(
+    simulation: &mut Simulation,
+    recorder: &mut Recorder,
+    bar: &Bar,
+    interrupted: &AtomicBool,
+) -> Result<()> {
+    recorder.record(simulation)?;
+    while let Some(time) = recorder.next_time() {
+        simulation.advance_with(time, &mut |progress| {
+            bar.update(progress);
+            if interrupted.load(Ordering::Relaxed) {
+                Control::Cancel
+            } else {
+                Control::Continue
+            }
+        })?;
+        recorder.record(simulation)?;
+    }
+    Ok(())
+}
+
+/// A flag that Ctrl-C raises; the run then ends after its present step. A second Ctrl-C kills.
+fn watch_interrupts() -> Result<Arc<AtomicBool>> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .map_err(|cause| Error::new(Code::Io, format!("cannot watch for Ctrl-C: {cause}")))?;
+    Ok(flag)
+}
+
+/// The progress bar on standard error; where that is no terminal, nothing is drawn.
+struct Bar {
+    bar: ProgressBar,
+    particles: f64,
+    end: f64,
+    start: Instant,
+}
+
+/// Parts of the whole time that the bar counts.
+const PARTS: f64 = 10_000.0;
+
+impl Bar {
+    fn new(simulation: &Simulation, quiet: bool) -> Self {
+        let target = if quiet {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
+        };
+        let style = ProgressStyle::with_template(
+            "{bar:30} {percent:>3} %  {msg}  elapsed {elapsed}, ETA {eta}",
+        )
+        .expect("the template is fixed and valid");
+        Self {
+            bar: ProgressBar::with_draw_target(Some(PARTS as u64), target).with_style(style),
+            particles: simulation.particle_count() as f64,
+            end: simulation.scene().time.end,
+            start: Instant::now(),
+        }
+    }
+
+    fn update(&self, progress: &Progress) {
+        if self.bar.is_hidden() {
+            return;
+        }
+        let speed = particle_steps_per_second(self.particles, progress.steps, self.start.elapsed());
+        self.bar.set_message(format!(
+            "t = {:.4e} s, {speed:.2e} particle-steps/s",
+            progress.time
+        ));
+        self.bar
+            .set_position((PARTS * progress.time / self.end) as u64);
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn particle_steps_per_second(particles: f64, steps: u64, elapsed: Duration) -> f64 {
+    particles * steps as f64 / elapsed.as_secs_f64().max(f64::MIN_POSITIVE)
+}
+
+/// What a finished run comes to.
+fn summary(
+    simulation: &Simulation,
+    recorder: &Recorder,
+    initial: Energies,
+    elapsed: Duration,
+) -> String {
+    let energies = simulation.energies();
+    let particles = simulation.particle_count();
+    let speed = particle_steps_per_second(particles as f64, simulation.steps(), elapsed);
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        writeln!(text, "{name:<22} {value}").expect("a String takes any text");
+    };
+    line(
+        "simulated",
+        format!(
+            "{} s in {} steps, {} particles",
+            simulation.time(),
+            grouped(simulation.steps()),
+            grouped(particles as u64)
+        ),
+    );
+    line(
+        "wall time",
+        format!(
+            "{:.2} s on {} threads, {speed:.2e} particle-steps/s",
+            elapsed.as_secs_f64(),
+            simulation.threads()
+        ),
+    );
+    for (name, value) in [
+        ("initial energy", initial.kinetic + initial.strain),
+        ("kinetic energy", energies.kinetic),
+        ("strain energy", energies.strain),
+        ("external work", energies.external_work),
+        ("numerical dissipation", energies.numerical_dissipation),
+        ("taken by projection", energies.projection),
+    ] {
+        line(name, format!("{value:>14.6e} J"));
+    }
+    // A body at rest without loads has no energy to compare with.
+    let scale = (initial.kinetic + initial.strain)
+        .max(energies.external_work.abs())
+        .max(energies.kinetic + energies.strain);
+    let share = if scale > 0.0 {
+        format!(
+            " ({:.1e} of the largest energy)",
+            energies.closure_error.abs() / scale
+        )
+    } else {
+        String::new()
+    };
+    line(
+        "closure error",
+        format!("{:>14.6e} J{share}", energies.closure_error),
+    );
+    line("results", recorder.folder().display().to_string());
+    text
+}

@@ -1,0 +1,282 @@
+//! A run's folder: which file is due when, and where it goes.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::variables::{self, OutputVariable, Reader, selected_fields};
+use super::{Collection, History, io_error, replace_file, write_vtu};
+use crate::error::{Error, Result};
+use crate::fields::Field;
+use crate::simulation::Simulation;
+
+/// Rows of the history unless the scene says how many.
+const DEFAULT_ROWS: f64 = 200.0;
+
+/// Writes `history.csv`, `fields.pvd`, `fields/*.vtu` and `scene.json` into a folder.
+///
+/// ```no_run
+/// # fn main() -> urlsph::Result<()> {
+/// # let scene = urlsph::Scene::from_json("{}", &[])?;
+/// let mut simulation = urlsph::Simulation::new(scene)?;
+/// let mut recorder = urlsph::output::Recorder::create("out", &simulation)?;
+/// recorder.record(&simulation)?;
+/// while let Some(time) = recorder.next_time() {
+///     simulation.advance(time)?;
+///     recorder.record(&simulation)?;
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Recorder {
+    folder: PathBuf,
+    end: f64,
+    time: f64,
+    variables: Vec<OutputVariable>,
+    history: History,
+    history_schedule: Schedule,
+    fields: Vec<Field>,
+    field_files: Option<FieldFiles>,
+}
+
+#[derive(Debug)]
+struct FieldFiles {
+    schedule: Schedule,
+    collection: Collection,
+    written: usize,
+}
+
+impl Recorder {
+    /// Sets up the folder with the scene as it is run. An earlier run in the same folder is replaced.
+    ///
+    /// # Errors
+    /// [`Code::Io`](crate::Code::Io) naming the file or folder,
+    /// [`Code::InvalidScene`](crate::Code::InvalidScene) for a field that there is not.
+    pub fn create(folder: impl Into<PathBuf>, simulation: &Simulation) -> Result<Self> {
+        let folder = folder.into();
+        let scene = simulation.scene();
+        let fields = selected_fields(scene)?;
+        let field_folder = folder.join("fields");
+        fs::create_dir_all(&folder).map_err(|cause| io_error("create", &folder, &cause))?;
+        remove_earlier(&folder, &field_folder)?;
+
+        let resolved = serde_json::to_string_pretty(scene).map_err(|cause| {
+            Error::argument(format!("the scene does not turn into JSON: {cause}"))
+        })?;
+        replace_file(&folder.join("scene.json"), |out| {
+            writeln!(out, "{resolved}")
+        })?;
+
+        let time = simulation.time();
+        let variables = variables::outputs(simulation);
+        let history = History::create(
+            folder.join("history.csv"),
+            variables.iter().flat_map(OutputVariable::element_names),
+        )?;
+        let interval = scene
+            .output
+            .history_interval
+            .unwrap_or(scene.time.end / DEFAULT_ROWS);
+        let field_files = match scene.output.field_interval {
+            Some(interval) => {
+                fs::create_dir_all(&field_folder)
+                    .map_err(|cause| io_error("create", &field_folder, &cause))?;
+                Some(FieldFiles {
+                    schedule: Schedule::new(interval, time),
+                    collection: Collection::create(folder.join("fields.pvd"))?,
+                    written: 0,
+                })
+            }
+            None => None,
+        };
+        Ok(Self {
+            end: scene.time.end,
+            time,
+            variables,
+            history,
+            history_schedule: Schedule::new(interval, time),
+            fields,
+            field_files,
+            folder,
+        })
+    }
+
+    /// The instant to advance to before the next [`record`](Self::record); `None` at the scene's end.
+    pub fn next_time(&self) -> Option<f64> {
+        if self.time >= self.end {
+            return None;
+        }
+        let fields = self
+            .field_files
+            .as_ref()
+            .map_or(f64::INFINITY, |files| files.schedule.next());
+        let due = self.history_schedule.next().min(fields);
+        // An instant that misses the end by rounding would cost a vanishing last step.
+        Some(if due > self.end - ROUNDING * self.end {
+            self.end
+        } else {
+            due
+        })
+    }
+
+    /// Writes what is due now; everything at the scene's end.
+    ///
+    /// # Errors
+    /// [`Code::Io`](crate::Code::Io) naming the file. The simulation is only read.
+    pub fn record(&mut self, simulation: &Simulation) -> Result<()> {
+        self.time = simulation.time();
+        let end = self.time >= self.end;
+        if self.history_schedule.take(self.time) || end {
+            self.write_row(simulation)?;
+        }
+        if let Some(files) = &mut self.field_files
+            && (files.schedule.take(self.time) || end)
+        {
+            let name = format!("fields/{STATE_FILE}{:06}.vtu", files.written);
+            write_vtu(&self.folder.join(&name), simulation, &self.fields)?;
+            files.collection.add(self.time, &name)?;
+            files.written += 1;
+        }
+        Ok(())
+    }
+
+    /// Writes a row of the history and a field file `last_good_state.vtu`, for a run that ended before its time.
+    ///
+    /// # Errors
+    /// [`Code::Io`](crate::Code::Io) naming the file.
+    pub fn record_last_state(&mut self, simulation: &Simulation) -> Result<PathBuf> {
+        // The state may be one that the history has already.
+        if simulation.time() > self.time {
+            self.time = simulation.time();
+            self.write_row(simulation)?;
+        }
+        let path = self.folder.join(LAST_STATE);
+        write_vtu(&path, simulation, &self.fields)?;
+        Ok(path)
+    }
+
+    fn write_row(&mut self, simulation: &Simulation) -> Result<()> {
+        let mut reader = Reader::new();
+        let mut values = Vec::new();
+        for variable in &self.variables {
+            let start = values.len();
+            values.resize(start + variable.len(), 0.0);
+            reader.read(simulation, variable, &mut values[start..])?;
+        }
+        self.history.append(simulation.time(), &values)
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+const STATE_FILE: &str = "state_";
+const LAST_STATE: &str = "last_good_state.vtu";
+
+/// Removes the field files of an earlier run, which the new run would not overwrite if it writes fewer.
+fn remove_earlier(folder: &Path, field_folder: &Path) -> Result<()> {
+    let remove = |path: &Path| match fs::remove_file(path) {
+        Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
+            Err(io_error("remove", path, &cause))
+        }
+        _ => Ok(()),
+    };
+    remove(&folder.join("fields.pvd"))?;
+    remove(&folder.join(LAST_STATE))?;
+    let Ok(entries) = fs::read_dir(field_folder) else {
+        return Ok(());
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let number = name
+            .to_str()
+            .and_then(|name| name.strip_prefix(STATE_FILE)?.strip_suffix(".vtu"));
+        // Only what this writer names so is its own to remove.
+        if number.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit())) {
+            remove(&entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+/// Share of an interval within which two instants are the same one: rounding, not physics.
+const ROUNDING: f64 = 1e-9;
+
+/// The multiples of an interval: `k * interval`, never a running sum, so that rounding does not add up.
+#[derive(Debug)]
+struct Schedule {
+    interval: f64,
+    index: f64,
+}
+
+impl Schedule {
+    /// The first multiple that is not before `time`.
+    fn new(interval: f64, time: f64) -> Self {
+        Self {
+            interval,
+            index: (time / interval - ROUNDING).ceil().max(0.0),
+        }
+    }
+    fn next(&self) -> f64 {
+        self.index * self.interval
+    }
+    /// Whether an instant of the schedule has come; the schedule moves on behind it.
+    fn take(&mut self, time: f64) -> bool {
+        let passed = (time / self.interval + ROUNDING).floor();
+        if passed < self.index {
+            return false;
+        }
+        self.index = passed + 1.0;
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_schedule_meets_every_multiple_once() {
+        let mut schedule = Schedule::new(0.1, 0.0);
+        assert!(schedule.take(0.0));
+        assert!(!schedule.take(0.0));
+        assert_eq!(schedule.next(), 0.1);
+        assert!(!schedule.take(0.05));
+        for k in 1..1000 {
+            let time = schedule.next();
+            assert_eq!(time, k as f64 * 0.1);
+            assert!(schedule.take(time));
+        }
+    }
+
+    #[test]
+    fn schedules_that_meet_up_to_rounding_take_the_same_instant() {
+        // 3 * 0.1 and 0.3 differ in the last bit.
+        let mut fine = Schedule::new(0.1, 0.25);
+        let mut coarse = Schedule::new(0.3, 0.25);
+        assert_ne!(fine.next(), coarse.next());
+        let time = fine.next().min(coarse.next());
+        assert!(fine.take(time) && coarse.take(time));
+        assert_eq!(fine.next(), 0.4);
+        assert_eq!(coarse.next(), 0.6);
+    }
+
+    #[test]
+    fn only_own_files_of_an_earlier_run_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let fields = folder.path().join("fields");
+        fs::create_dir(&fields).unwrap();
+        for name in ["state_000007.vtu", "state_mine.vtu", "other.vtu"] {
+            fs::write(fields.join(name), "").unwrap();
+        }
+        fs::write(folder.path().join("notes.txt"), "").unwrap();
+        remove_earlier(folder.path(), &fields).unwrap();
+        assert!(!fields.join("state_000007.vtu").exists());
+        assert!(fields.join("state_mine.vtu").exists());
+        assert!(fields.join("other.vtu").exists());
+        assert!(folder.path().join("notes.txt").exists());
+    }
+}

@@ -1,0 +1,323 @@
+//! The command line as a user meets it: files, messages, exit statuses.
+#![cfg(feature = "cli")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+use urlsph::Scene;
+
+/// A small column that swings; coarse, so that a run takes a fraction of a second.
+const SCENE: &str = r#"{
+  "title": "Small column",
+  "geometry": { "box": { "min": [0, 0, 0], "max": [1, 3, 1], "spacing": 0.5 } },
+  "material": { "neo_hookean": { "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3 } },
+  "patches": { "top": { "faces": ["y_max"] } },
+  "boundary": { "y_min": { "support": "clamped" } },
+  "initial": { "velocity": ["Y", 0, 0] },
+  "probes": { "tip": [0.5, 3, 0.5] },
+  "time": { "end": 0.01 },
+  "output": { "history_interval": 0.001, "field_interval": 0.003 }
+}"#;
+
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("scene.json"), SCENE).unwrap();
+        Self { folder }
+    }
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_urlsph"));
+        command.args(arguments).current_dir(self.folder.path());
+        command
+    }
+    fn urlsph(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().unwrap()
+    }
+    /// Runs a command that must succeed; what it printed.
+    fn succeeds(&self, arguments: &[&str]) -> String {
+        let output = self.urlsph(arguments);
+        assert!(output.status.success(), "{}", stderr(&output));
+        String::from_utf8(output.stdout).unwrap()
+    }
+    /// Runs a command that must fail with a status; the message.
+    fn fails(&self, status: i32, arguments: &[&str]) -> String {
+        let output = self.urlsph(arguments);
+        assert_eq!(output.status.code(), Some(status), "{}", stderr(&output));
+        stderr(&output)
+    }
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A history: its header and its rows.
+fn history(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let header = lines
+        .next()
+        .unwrap()
+        .split(',')
+        .map(str::to_owned)
+        .collect();
+    let rows = lines
+        .map(|line| line.split(',').map(|x| x.parse().unwrap()).collect())
+        .collect();
+    (header, rows)
+}
+
+#[test]
+fn a_run_writes_its_history_fields_and_scene() {
+    let bench = Bench::new();
+    let printed = bench.succeeds(&["run", "scene.json", "--out", "results", "--threads", "2"]);
+    for word in [
+        "simulated",
+        "on 2 threads",
+        "kinetic energy",
+        "closure error",
+    ] {
+        assert!(printed.contains(word), "{word} in:\n{printed}");
+    }
+
+    let (header, rows) = history(&bench.path("results/history.csv"));
+    assert_eq!(header[0], "time");
+    for name in [
+        "probe.tip.displacement[1]",
+        "probe.tip.velocity[3]",
+        "energy.kinetic",
+        "energy.strain",
+        "energy.external_work",
+        "energy.numerical_dissipation",
+        "boundary.y_min.force[1]",
+        "boundary.top.force[2]",
+    ] {
+        assert!(header.iter().any(|column| column == name), "{name}");
+    }
+    let times: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    let expected: Vec<f64> = (0..=10).map(|k| f64::from(k) * 0.001).collect();
+    assert_eq!(times, expected, "rows land exactly on their times");
+    assert!(rows.iter().all(|row| row.len() == header.len()));
+    assert!(rows.iter().flatten().all(|value| value.is_finite()));
+
+    let collection = fs::read_to_string(bench.path("results/fields.pvd")).unwrap();
+    for (k, time) in [0.0, 0.003, 0.006, 3.0 * 0.003, 0.01].iter().enumerate() {
+        let entry = format!("timestep=\"{time:?}\" file=\"fields/state_{k:06}.vtu\"");
+        assert!(collection.contains(&entry), "{entry} in:\n{collection}");
+        let file = fs::read(bench.path(&format!("results/fields/state_{k:06}.vtu"))).unwrap();
+        assert!(file.ends_with(b"</VTKFile>\n"));
+    }
+    assert_eq!(collection.matches("<DataSet ").count(), 5);
+
+    let resolved = fs::read_to_string(bench.path("results/scene.json")).unwrap();
+    assert_eq!(
+        Scene::from_json(&resolved, &[]).unwrap(),
+        Scene::from_json(SCENE, &[]).unwrap()
+    );
+}
+
+#[test]
+fn output_does_not_depend_on_threads_and_an_earlier_run_is_replaced() {
+    let bench = Bench::new();
+    bench.succeeds(&["run", "scene.json", "--out", "a", "--threads", "1"]);
+    bench.succeeds(&[
+        "run",
+        "scene.json",
+        "--out",
+        "b",
+        "--threads",
+        "3",
+        "--set",
+        "output.field_interval=0.001",
+    ]);
+    assert!(bench.path("b/fields/state_000010.vtu").exists());
+    bench.succeeds(&["run", "scene.json", "--out", "b", "--threads", "3"]);
+    assert!(!bench.path("b/fields/state_000010.vtu").exists());
+    for file in [
+        "history.csv",
+        "fields.pvd",
+        "fields/state_000004.vtu",
+        "scene.json",
+    ] {
+        assert_eq!(
+            fs::read(bench.path("a").join(file)).unwrap(),
+            fs::read(bench.path("b").join(file)).unwrap(),
+            "{file}"
+        );
+    }
+}
+
+#[test]
+fn overrides_and_until_reach_the_scene() {
+    let bench = Bench::new();
+    let printed = bench.succeeds(&[
+        "run",
+        "scene.json",
+        "--out",
+        "r",
+        "--until",
+        "0.002",
+        "--set",
+        "geometry.box.spacing=0.25",
+    ]);
+    assert!(
+        printed.contains("simulated              0.002 s"),
+        "{printed}"
+    );
+    assert!(printed.contains("325 particles"), "{printed}");
+    let (_, rows) = history(&bench.path("r/history.csv"));
+    assert_eq!(rows.last().unwrap()[0], 0.002);
+    let resolved = fs::read_to_string(bench.path("r/scene.json")).unwrap();
+    assert_eq!(Scene::from_json(&resolved, &[]).unwrap().time.end, 0.002);
+}
+
+#[test]
+fn quiet_says_nothing() {
+    let bench = Bench::new();
+    let output = bench.urlsph(&["run", "scene.json", "--out", "r", "--quiet"]);
+    assert!(output.status.success());
+    assert!(output.stdout.is_empty() && output.stderr.is_empty());
+}
+
+#[test]
+fn check_prints_the_plan_and_writes_nothing() {
+    let bench = Bench::new();
+    let printed = bench.succeeds(&["check", "scene.json"]);
+    for word in [
+        "Small column",
+        "particles",
+        "63",
+        "neighbours",
+        "stable step",
+        "steps",
+        "memory",
+        "on ",
+        "off ",
+    ] {
+        assert!(printed.contains(word), "{word} in:\n{printed}");
+    }
+    assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn schema_is_json_that_names_the_parts_of_a_scene() {
+    let schema: serde_json::Value =
+        serde_json::from_str(&Bench::new().succeeds(&["schema"])).unwrap();
+    for key in [
+        "geometry", "material", "boundary", "numerics", "time", "output",
+    ] {
+        assert!(schema["properties"][key].is_object(), "{key}");
+    }
+}
+
+#[test]
+fn wrong_usage_has_status_2_and_says_how() {
+    let bench = Bench::new();
+    assert!(
+        bench
+            .fails(2, &["run", "scene.json"])
+            .contains("--out <DIR>")
+    );
+    assert!(bench.fails(2, &["walk"]).contains("walk"));
+    assert!(
+        bench
+            .fails(2, &["run", "scene.json", "--out", "r", "--threads", "many"])
+            .contains("many")
+    );
+}
+
+#[test]
+fn errors_have_status_1_and_name_the_place() {
+    let bench = Bench::new();
+    let message = bench.fails(1, &["check", "nowhere.json"]);
+    assert!(message.contains("nowhere.json"), "{message}");
+
+    let message = bench.fails(
+        1,
+        &[
+            "check",
+            "scene.json",
+            "--set",
+            "material.neo_hookean.density=-1",
+        ],
+    );
+    assert!(
+        message.contains("material.neo_hookean.density"),
+        "{message}"
+    );
+
+    let message = bench.fails(1, &["run", "scene.json", "--out", "r", "--until", "soon"]);
+    assert!(
+        message.contains("time.end") && message.contains("soon"),
+        "{message}"
+    );
+
+    let message = bench.fails(1, &["run", "scene.json", "--out", "scene.json/results"]);
+    assert!(message.contains("scene.json/results"), "{message}");
+}
+
+#[test]
+fn a_diverged_run_leaves_its_last_good_state_and_advice() {
+    let bench = Bench::new();
+    let message = bench.fails(
+        1,
+        &[
+            "run",
+            "scene.json",
+            "--out",
+            "r",
+            "--set",
+            "numerics.time_step=0.01",
+            "--until",
+            "1",
+            "--set",
+            "initial.velocity=[\"200*Y\", 0, 0]",
+        ],
+    );
+    for word in ["particle", "time", "last_good_state.vtu", "numerics.cfl"] {
+        assert!(message.contains(word), "{word} in: {message}");
+    }
+    assert!(bench.path("r/last_good_state.vtu").exists());
+    let (header, rows) = history(&bench.path("r/history.csv"));
+    assert!(rows.iter().all(|row| row.len() == header.len()));
+    assert!(rows.iter().flatten().all(|value| value.is_finite()));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_has_status_130_and_whole_files() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command(&["run", "scene.json", "--out", "r", "--until", "1000"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The handler is installed before the first row is written.
+    let patience = Instant::now() + Duration::from_secs(60);
+    while fs::read_to_string(bench.path("r/history.csv")).map_or(0, |text| text.lines().count()) < 3
+    {
+        assert!(Instant::now() < patience, "the run does not get going");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let killed = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(killed.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let (header, rows) = history(&bench.path("r/history.csv"));
+    assert!(rows.iter().all(|row| row.len() == header.len()));
+    assert!(bench.path("r/last_good_state.vtu").exists());
+    let collection = fs::read_to_string(bench.path("r/fields.pvd")).unwrap();
+    assert!(collection.ends_with("</VTKFile>\n"));
+}

@@ -1,0 +1,301 @@
+//! The tests of the C ABI: C11, C++17 and Python programs against an installed library, shared and
+//! static, and with sanitizers; the examples in C and C++.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Error, Result, anyhow, ensure};
+use xshell::{Shell, cmd};
+
+use crate::tally::Tally;
+use crate::{header, install, project, venv, wheel};
+
+const SCENE: &str = "ffi-tests/scene.json";
+
+/// `cargo xtask ffi-tests`: these alone.
+pub fn run(sh: &Shell) -> Result<()> {
+    let tally = ffi_tests(sh)?;
+    println!("{} passed, {} failed", tally.passed, tally.failed);
+    ensure!(tally.failed == 0, "the tests of the C ABI failed");
+    Ok(())
+}
+
+/// Runs all of them, each as far as it gets.
+pub fn ffi_tests(sh: &Shell) -> Result<Tally> {
+    let setup = Setup::new(sh)?;
+    let mut tally = Tally::default();
+    for (name, outcome) in [
+        ("header", Ok(Tally::of(header::header(sh, true)))),
+        ("installation", Ok(Tally::of(setup.check_installation(sh)))),
+        ("programs", setup.programs(sh)),
+        ("example in C", setup.c_example(sh)),
+        ("example in C++", setup.cpp_example(sh)),
+        ("python", setup.python(sh)),
+    ] {
+        let part = outcome.unwrap_or_else(|error| Tally::of(Err::<(), _>(error)));
+        println!("-- {name}: {} passed, {} failed", part.passed, part.failed);
+        tally += part;
+    }
+    Ok(tally)
+}
+
+/// Tools, and where the library is installed.
+struct Setup {
+    prefix: PathBuf,
+    build: PathBuf,
+    python: PathBuf,
+    /// Folder of the tools that come with the Python environment: cmake, ninja, pkgconf.
+    tools: PathBuf,
+}
+
+impl Setup {
+    fn new(sh: &Shell) -> Result<Self> {
+        let python = venv::python(sh)?;
+        let tools = python.parent().context("an interpreter lies in a folder")?;
+        let build = project::target().join("ffi-tests");
+        let destdir = build.join("destdir");
+        let setup = Self {
+            prefix: destdir.join("opt").join("urlsph"),
+            build,
+            tools: tools.to_owned(),
+            python,
+        };
+        // What an older version has left there must not help.
+        sh.remove_path(&destdir)?;
+        // As packagers do it; that the programs find the library here and not under /opt shows that
+        // the installation can be moved.
+        let destdir = destdir.to_str().context("the path is not UTF-8")?;
+        install::install(sh, &["--prefix", "/opt/urlsph", "--destdir", destdir])?;
+        Ok(setup)
+    }
+
+    fn tool(&self, name: &str) -> PathBuf {
+        self.tools.join(name)
+    }
+
+    /// Runs a program against the installed shared library.
+    fn run(&self, program: &Path, arguments: &[&str]) -> Result<Tally> {
+        let mut command = Command::new(program);
+        command
+            .current_dir(project::root())
+            .args(arguments)
+            .env("LD_LIBRARY_PATH", self.prefix.join("lib"))
+            .env("DYLD_LIBRARY_PATH", self.prefix.join("lib"));
+        Tally::run(command)
+    }
+
+    /// What is installed, and what pkg-config says about it.
+    fn check_installation(&self, sh: &Shell) -> Result<()> {
+        for file in [
+            "bin/urlsph",
+            "include/urlsph.h",
+            "include/urlsph.hpp",
+            "lib/liburlsph.a",
+            "lib/pkgconfig/urlsph.pc",
+            "lib/cmake/urlsph/urlsphConfig.cmake",
+            "lib/cmake/urlsph/urlsphConfigVersion.cmake",
+            "share/licenses/urlsph/LICENSE-MIT",
+            "share/licenses/urlsph/LICENSE-APACHE",
+        ] {
+            ensure!(self.prefix.join(file).is_file(), "{file} is not installed");
+        }
+        let version = self.pkg_config(sh, &["--modversion"])?;
+        ensure!(
+            version == [env!("CARGO_PKG_VERSION")],
+            "pkg-config gives {version:?}"
+        );
+        Ok(())
+    }
+
+    /// What pkg-config says about the installed library.
+    fn pkg_config(&self, sh: &Shell, arguments: &[&str]) -> Result<Vec<String>> {
+        let pkgconf = self.tool("pkgconf");
+        let said = cmd!(sh, "{pkgconf} {arguments...} urlsph")
+            .quiet()
+            .env("PKG_CONFIG_PATH", self.prefix.join("lib").join("pkgconfig"))
+            .read()?;
+        Ok(said.split_whitespace().map(str::to_owned).collect())
+    }
+
+    /// Configures and builds a CMake project against the installed library.
+    fn cmake(&self, sh: &Shell, source: &str, name: &str, options: &[&str]) -> Result<PathBuf> {
+        let build = self.build.join(name);
+        let (cmake, ninja, prefix) = (self.tool("cmake"), self.tool("ninja"), &self.prefix);
+        // The compilers and the prefix may have changed.
+        sh.remove_path(&build)?;
+        cmd!(
+            sh,
+            "{cmake} -S {source} -B {build} -G Ninja -DCMAKE_MAKE_PROGRAM={ninja} -DCMAKE_PREFIX_PATH={prefix} {options...}"
+        )
+        .quiet()
+        .ignore_stdout()
+        .run()?;
+        cmd!(sh, "{cmake} --build {build}")
+            .quiet()
+            .ignore_stdout()
+            .run()?;
+        Ok(build)
+    }
+
+    /// The test programs, in every way of linking and checking.
+    fn programs(&self, sh: &Shell) -> Result<Tally> {
+        let mut tally = Tally::default();
+        let sanitizers = self.sanitizers(sh)?;
+        if !sanitizers {
+            println!("the C compiler has no sanitizers: tests without them");
+        }
+        for link in ["shared", "static"] {
+            for sanitize in ["OFF", "ON"] {
+                if sanitize == "ON" && !sanitizers {
+                    continue;
+                }
+                let name = format!("{link}-sanitizers-{sanitize}").to_lowercase();
+                println!("-- {name}");
+                let options = [
+                    format!("-DURLSPH_LINK={link}"),
+                    format!("-DURLSPH_SANITIZE={sanitize}"),
+                ];
+                let options = options.each_ref().map(String::as_str);
+                let build = self.cmake(sh, "ffi-tests", &name, &options)?;
+                for program in ["api", "wrapper"] {
+                    tally += self.run(&build.join(program), &[SCENE])?;
+                }
+            }
+        }
+        Ok(tally)
+    }
+
+    /// Whether programs with sanitizers can be linked and run here.
+    fn sanitizers(&self, sh: &Shell) -> Result<bool> {
+        let (source, program) = (self.build.join("probe.c"), self.build.join("probe"));
+        sh.write_file(&source, "int main(void) { return 0; }\n")?;
+        let cc = compiler();
+        let built = cmd!(
+            sh,
+            "{cc} -fsanitize=address,undefined {source} -o {program}"
+        )
+        .quiet()
+        .ignore_stderr()
+        .run();
+        Ok(built.is_ok() && cmd!(sh, "{program}").quiet().ignore_stderr().run().is_ok())
+    }
+
+    /// examples/c by the lines that its head gives: pkg-config, shared and static.
+    fn c_example(&self, sh: &Shell) -> Result<Tally> {
+        let mut tally = Tally::default();
+        let warnings = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror"];
+        let cc = compiler();
+        let shared = self.build.join("column-shared");
+        let flags = self.pkg_config(sh, &["--cflags", "--libs"])?;
+        cmd!(
+            sh,
+            "{cc} {warnings...} examples/c/column.c -o {shared} {flags...}"
+        )
+        .quiet()
+        .run()?;
+
+        let fixed = self.build.join("column-static");
+        let include = self.pkg_config(sh, &["--cflags"])?;
+        let folder = self.pkg_config(sh, &["--variable=libdir"])?;
+        let archive = Path::new(&folder[0]).join("liburlsph.a");
+        let system = self.pkg_config(sh, &["--static", "--libs-only-l"])?;
+        let system = system.iter().filter(|l| *l != "-lurlsph");
+        cmd!(
+            sh,
+            "{cc} {warnings...} examples/c/column.c -o {fixed} {include...} {archive} {system...}"
+        )
+        .quiet()
+        .run()?;
+
+        for program in [&shared, &fixed] {
+            tally += self.example(sh, program, &["examples/c/column.json"], "the same bits");
+        }
+        // The exit code is the status: this file is no scene, and that one is not there.
+        for (scene, status) in [("Cargo.toml", 2), ("examples/c/nowhere.json", 4)] {
+            let code = Command::new(&fixed)
+                .current_dir(project::root())
+                .arg(scene)
+                .stderr(std::process::Stdio::null())
+                .status()?
+                .code();
+            tally += Tally::of(if code == Some(status) {
+                Ok(())
+            } else {
+                Err(anyhow!(
+                    "column {scene} exits with {code:?} instead of {status}"
+                ))
+            });
+        }
+        Ok(tally)
+    }
+
+    /// examples/cpp_cmake by find_package, shared and static.
+    fn cpp_example(&self, sh: &Shell) -> Result<Tally> {
+        let build = self.cmake(sh, "examples/cpp_cmake", "cpp_cmake", &[])?;
+        let mut tally = Tally::default();
+        for program in ["swinging_column", "swinging_column_static"] {
+            tally += self.example(sh, &build.join(program), &[], "time steps");
+        }
+        Ok(tally)
+    }
+
+    /// Runs an example, which is one test: it succeeds and says what it should.
+    fn example(&self, sh: &Shell, program: &Path, arguments: &[&str], says: &str) -> Tally {
+        let lib = self.prefix.join("lib");
+        let outcome = cmd!(sh, "{program} {arguments...}")
+            .quiet()
+            .env("LD_LIBRARY_PATH", &lib)
+            .env("DYLD_LIBRARY_PATH", &lib)
+            .read()
+            .map_err(Error::from)
+            .and_then(|said| {
+                println!("{said}");
+                ensure!(
+                    said.contains(says),
+                    "{} does not say `{says}`",
+                    program.display()
+                );
+                Ok(())
+            });
+        Tally::of(outcome)
+    }
+
+    /// The Python module: as a wheel in an environment of its own, and by the search for the library.
+    fn python(&self, sh: &Shell) -> Result<Tally> {
+        let wheel = wheel::wheel(sh)?;
+        let site = self.build.join("site");
+        let python = &self.python;
+        sh.remove_path(&site)?;
+        cmd!(
+            sh,
+            "{python} -m pip install --quiet --disable-pip-version-check --no-deps --target {site} {wheel}"
+        )
+        .run()?;
+        let tests = |path: &Path, library: Option<PathBuf>| {
+            let mut command = Command::new(python);
+            command
+                .current_dir(project::root())
+                .args(["-B", "-m", "pytest", "-q", "-p", "no:cacheprovider"])
+                .arg("ffi-tests/python")
+                .env("PYTHONPATH", path)
+                .env_remove("URLSPH_LIBRARY")
+                .env("LD_LIBRARY_PATH", self.prefix.join("lib"));
+            if let Some(library) = library {
+                command
+                    .env("URLSPH_LIBRARY", library)
+                    .env_remove("LD_LIBRARY_PATH");
+            }
+            Tally::run(command)
+        };
+        let sources = Path::new("include/python");
+        let installed = install::SharedLibrary::of_this_platform()?.plain;
+        let mut tally = tests(&site, None)?;
+        tally += tests(sources, Some(self.prefix.join("lib").join(installed)))?;
+        tally += tests(sources, None)?;
+        Ok(tally)
+    }
+}
+
+fn compiler() -> String {
+    std::env::var("CC").unwrap_or_else(|_| "cc".to_owned())
+}
