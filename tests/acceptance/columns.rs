@@ -252,19 +252,16 @@ fn twist_angle_converges_to_the_reference() {
 }
 
 #[test]
-#[ignore = "28,000 particles: cargo xtask validate"]
 fn bending_of_the_finest_model() {
     finest(&BENDING);
 }
 
 #[test]
-#[ignore = "28,000 particles: cargo xtask validate"]
 fn tension_of_the_finest_model() {
     finest(&TENSION);
 }
 
 #[test]
-#[ignore = "28,000 particles: cargo xtask validate"]
 fn twisting_of_the_finest_model() {
     finest(&TWISTING);
 }
@@ -273,6 +270,6 @@ fn twisting_of_the_finest_model() {
 #[ignore = "full histories: cargo xtask validate"]
 fn phase_and_amplitude_over_the_full_histories() {
     for case in [&BENDING, &TENSION, &TWISTING] {
-        phase_and_amplitude(case, &[M1, M2, M3]);
+        phase_and_amplitude(case, &[M1, M2, M3, M4]);
     }
 }

@@ -126,20 +126,56 @@ fn dissipation_is_positive_and_falls_with_refinement() {
     }
 }
 
+/// The ledger's error is what the time integrator dissipates, of third order in the step: a mode of
+/// frequency w loses (w dt)^4 / 12 of its energy in a step.
+fn closure(case: &str, end: f64, model: Model, tolerance: f64, tolerance_half: f64) {
+    let [whole, half] = ["0.3", "0.15"].map(|cfl| {
+        let cfl = format!("numerics.cfl={cfl}");
+        ledger(column(case, model, &[&cfl]), end).closure
+    });
+    check(
+        &format!("{case} {} closure at CFL 0.3", model.0),
+        whole,
+        tolerance,
+    );
+    check(
+        &format!("{case} {} closure at CFL 0.15", model.0),
+        half,
+        tolerance_half,
+    );
+    let what = format!("{case} {} order of the closure in the step", model.0);
+    check_at_least(&what, order((2.0, whole), (1.0, half)), 2.8);
+}
+
+/// An error of 1e-6 at CFL 0.3 is not reached by these models: the initial velocities excite the
+/// shortest waves at the clamped end, and the integrator shares in their dissipation. It is reached
+/// at CFL 0.15, or by the finest model (`ledger_of_the_finest_model`).
 #[test]
-#[ignore = "exploration"]
-fn closure_survey() {
-    for (case, end) in [
-        ("column_bending", 0.6),
-        ("column_twisting", 0.1),
-        ("column_tension", 0.12),
+fn ledger_closes_at_third_order() {
+    closure("column_bending", 0.6, M1, 1e-5, 2e-6);
+    closure("column_bending", 0.6, M2, 1e-5, 1e-6);
+    closure("column_bending", 0.6, M3, 1e-5, 1e-6);
+    closure("column_tension", 0.12, M1, 2e-5, 2e-6);
+    closure("column_tension", 0.12, M2, 1e-5, 1e-6);
+    closure("column_tension", 0.12, M3, 5e-6, 1e-6);
+    // Degrees of turn in every step.
+    closure("column_twisting", 0.1, M1, 2e-3, 3e-4);
+    closure("column_twisting", 0.1, M2, 1e-3, 1e-4);
+    closure("column_twisting", 0.1, M3, 5e-4, 5e-5);
+}
+
+#[test]
+#[ignore = "28,000 particles: cargo xtask validate"]
+fn ledger_of_the_finest_model() {
+    for (case, end, tolerance) in [
+        ("column_tension", 0.12, 1e-6),
+        ("column_bending", 0.6, 1.2e-6),
     ] {
-        for model in [M1, M2, M3] {
-            for cfl in ["0.9", "0.3", "0.15"] {
-                let cfl = format!("numerics.cfl={cfl}");
-                let found = ledger(column(case, model, &[&cfl]), end);
-                println!("{case} {} {cfl}: closure {:.2e}", model.0, found.closure);
-            }
-        }
+        let found = ledger(column(case, M4, &["numerics.cfl=0.3"]), end);
+        check(
+            &format!("{case} M4 closure at CFL 0.3"),
+            found.closure,
+            tolerance,
+        );
     }
 }

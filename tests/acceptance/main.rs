@@ -5,4 +5,7 @@
 mod columns;
 mod conservation;
 mod elastic_cube;
+mod numerics;
+mod reproducibility;
+mod stability;
 mod support;

@@ -105,12 +105,6 @@ pub fn norm(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
-/// Largest absolute difference.
-pub fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    a.iter().zip(b).fold(0.0, |m, (a, b)| (a - b).abs().max(m))
-}
-
 /// Columns of numbers over time.
 pub struct Table {
     names: Vec<String>,

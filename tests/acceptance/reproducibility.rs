@@ -1,0 +1,156 @@
+//! The same bits with any number of threads, and after a snapshot was restored.
+
+use urlsph::{Simulation, Snapshot};
+
+use crate::support::*;
+
+/// Scenes and options that take different paths through the solver.
+const VARIANTS: &[(&str, &[&str])] = &[
+    ("column_bending", &[]),
+    (
+        "column_twisting",
+        &["numerics.angular_momentum_projection=true"],
+    ),
+    ("column_twisting", &["numerics.reference_update=every_step"]),
+    (
+        "column_twisting",
+        &[
+            "numerics.reference_update=every_step",
+            "numerics.kernel_option=2",
+        ],
+    ),
+    (
+        "column_twisting",
+        &[
+            "numerics.reference_update=every_step",
+            "numerics.kernel_option=3",
+        ],
+    ),
+    (
+        "column_twisting",
+        &[
+            "numerics.reference_update=every_step",
+            "numerics.kernel_option=4",
+        ],
+    ),
+    (
+        "column_twisting",
+        &[
+            "numerics.reference_update={\"every\": 3}",
+            "numerics.state=fhj",
+            "numerics.volume_dissipation=0.05",
+            "numerics.angular_momentum_projection=true",
+        ],
+    ),
+    (
+        "column_bending",
+        &["numerics.limiter=venkatakrishnan", "numerics.neighbours=26"],
+    ),
+    (
+        "column_bending",
+        &["numerics.limiter=minmod", "numerics.weights=tributary"],
+    ),
+    (
+        "column_bending",
+        &[
+            "body_force=[0, \"-9.81e3*sin(10*t)\", \"100*X\"]",
+            "numerics.state=fj",
+        ],
+    ),
+    (
+        "column_tension",
+        &["numerics.reconstruction=none", "numerics.neighbours=6"],
+    ),
+    ("l_block", &[]),
+    ("elastic_cube", &["numerics.neighbours={\"radius\": 2.1}"]),
+];
+
+/// Twelve steps in two calls, so that the time step meets an end that is not its own.
+fn advance(simulation: &mut Simulation) {
+    let dt = simulation.stable_step();
+    for steps in [5.3, 6.1] {
+        let next = simulation.time() + steps * dt;
+        simulation.advance(next).unwrap_or_else(|e| panic!("{e}"));
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    for (case, overrides) in VARIANTS {
+        let mut all = overrides.to_vec();
+        if case.starts_with("column") {
+            // Enough particles for several chunks of work.
+            all.push("geometry.box.spacing=0.125");
+        }
+        let hashes = [1, 2, 3, 8].map(|threads| {
+            let mut simulation = with_threads(case, &all, threads);
+            assert_eq!(simulation.threads(), threads);
+            let before = simulation.state_hash();
+            advance(&mut simulation);
+            assert_ne!(simulation.state_hash(), before, "the body moves");
+            (
+                simulation.state_hash(),
+                simulation.energies().kinetic.to_bits(),
+            )
+        });
+        println!(
+            "{case} {overrides:?}: {:016x} with 1, 2, 3, 8 threads",
+            hashes[0].0
+        );
+        assert_eq!(hashes, [hashes[0]; 4], "{case} {overrides:?}");
+    }
+}
+
+#[test]
+fn a_restored_run_gives_the_same_bits() {
+    for (case, overrides) in VARIANTS {
+        let mut straight = simulation(case, overrides);
+        advance(&mut straight);
+        let bytes = straight.snapshot().to_bytes();
+        let at_snapshot = straight.state_hash();
+        advance(&mut straight);
+
+        let snapshot = Snapshot::from_bytes(&bytes).expect("a snapshot");
+        let mut restored = with_threads(case, overrides, 2);
+        restored.restore(&snapshot).expect("of the same scene");
+        assert_eq!(
+            restored.state_hash(),
+            at_snapshot,
+            "{case} {overrides:?}: as taken"
+        );
+        advance(&mut restored);
+        println!(
+            "{case} {overrides:?}: {:016x}, straight and restored",
+            straight.state_hash()
+        );
+        assert_eq!(
+            restored.state_hash(),
+            straight.state_hash(),
+            "{case} {overrides:?}"
+        );
+        assert_eq!(
+            restored.energies(),
+            straight.energies(),
+            "{case} {overrides:?}"
+        );
+        let resultants = |s: &Simulation| {
+            (0..s.patches().len())
+                .map(|p| s.resultant(p))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            resultants(&restored),
+            resultants(&straight),
+            "{case} {overrides:?}"
+        );
+
+        // A simulation that went elsewhere comes back.
+        straight.restore(&snapshot).expect("of the same scene");
+        advance(&mut straight);
+        assert_eq!(
+            straight.state_hash(),
+            restored.state_hash(),
+            "{case} {overrides:?}: rolled back"
+        );
+    }
+}
