@@ -1,6 +1,6 @@
 //! One right-hand side and one time step: time per directed neighbour pair (`Throughput::Elements`).
 //!
-//! A column of 17 x 97 x 17 particles in the middle of a twist. `cargo bench --bench step`.
+//! A column of 17 x 97 x 17 particles at the start of a twist. `cargo bench --bench step`.
 
 use std::hint::black_box;
 

@@ -133,7 +133,8 @@ const MATERIAL: [(&str, &str, &str); 4] = [
     ),
 ];
 
-fn parameters(scene: &Scene) -> Result<Vec<Parameter>> {
+fn parameters(simulation: &Simulation) -> Result<Vec<Parameter>> {
+    let scene = simulation.scene();
     let mut list = Vec::new();
     let tree = scene_tree(scene)?;
     // One law: `material` is an object with one key.
@@ -163,7 +164,7 @@ fn parameters(scene: &Scene) -> Result<Vec<Parameter>> {
     // The scene has either a fixed step or a CFL number.
     match numerics.time_step {
         Some(step) => number("time_step", "s", "Fixed time step", step),
-        None => number("cfl", "1", "CFL number", numerics.cfl_number()),
+        None => number("cfl", "1", "CFL number", simulation.cfl_number()),
     }
     number(
         "smoothing_factor",
@@ -207,7 +208,7 @@ impl Table {
         let mut table = Self {
             version,
             variables: Vec::new(),
-            parameters: parameters(simulation.scene())?,
+            parameters: parameters(simulation)?,
             outputs: variables::outputs(simulation),
             token: String::new(),
         };

@@ -423,9 +423,8 @@ impl Boundary {
         let layout = reference.layout;
         let (x, v) = (reference.x_initial.components(), state.v.components());
         let volume = reference.volume.components()[0];
-        let constant = body_force
-            .is_constant()
-            .then(|| body_force.eval([0.0; 3], t));
+        let everywhere = !body_force.depends_on_space();
+        let constant = everywhere.then(|| body_force.eval([0.0; 3], t));
         let powers = parallel::map_slabs(force.slabs_mut(), |slab, out| {
             let (first, _) = layout.slab_range(slab);
             let mut power = 0.0;
@@ -472,9 +471,16 @@ impl Boundary {
         if s.prescribed.is_empty() {
             return Ok([0.0; 3]);
         }
-        let before = self.prescribed_velocity(s, t - span, inputs)?;
-        let after = self.prescribed_velocity(s, t + span, inputs)?;
-        Ok(scale3(0.5 / span, sub3(after, before)))
+        // One-sided where a side is before the start or has no value, as sqrt(t) has none before 0.
+        let now = self.prescribed_velocity(s, t, inputs)?;
+        let at = |time: f64| self.prescribed_velocity(s, time, inputs).map(|v| (time, v));
+        let (from, before) = at((t - span).max(0.0)).unwrap_or((t, now));
+        let (to, after) = at(t + span).unwrap_or((t, now));
+        if to > from {
+            Ok(scale3(1.0 / (to - from), sub3(after, before)))
+        } else {
+            Ok([0.0; 3])
+        }
     }
 
     /// Internal forces (in `url.rates.force`), loads and body force, without support reactions [N].

@@ -90,6 +90,15 @@ fields! {
     NodalForce "nodal_force" "N" 3 Current "Sum of internal forces, loads and support reactions on a particle";
 }
 
+// `Field::info` looks a field up by its number.
+const _: () = {
+    let mut i = 0;
+    while i < FIELDS.len() {
+        assert!(FIELDS[i].field as usize == i);
+        i += 1;
+    }
+};
+
 impl FieldInfo {
     /// The field of this name.
     pub fn by_name(name: &str) -> Option<&'static FieldInfo> {

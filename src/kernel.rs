@@ -1,4 +1,5 @@
-//! The quadratic kernel of [URL22] section 4.1 (its reference 64) and its gradient.
+//! The quadratic kernel that [URL22] section 4.1 takes from Johnson, Stryk and Beissel (1996), and
+//! its gradient.
 
 use std::f64::consts::PI;
 

@@ -149,7 +149,7 @@ impl<const N: usize> Array<N> {
             })
             .collect()
     }
-    /// Copies the particles' values from an array of the same layout.
+    /// Copies an array of the same layout.
     pub fn copy_from(&mut self, other: &Self) {
         self.data.copy_from_slice(&other.data);
     }

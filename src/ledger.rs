@@ -1,6 +1,7 @@
 //! The ledger: what energy came in, what is stored, what was dissipated and by whom; momenta.
 
-/// Energies [J]. `total` terms are accumulated since time 0 with the weights of the time integrator.
+/// Energies [J]. Works and dissipations are accumulated since time 0 with the weights of the time
+/// integrator.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Energies {
     /// Kinetic energy, sum of m v.v / 2.

@@ -28,6 +28,7 @@ impl Graph {
             Neighbours::Radius { radius } => radius_lists(
                 &particles.positions,
                 radius * particles.lattice.largest_spacing(),
+                &particles.lattice,
             ),
         };
         let graph = Self::from_lists(lists);
@@ -122,7 +123,7 @@ fn lattice_lists(lattice: &Lattice, count: usize, number: u8) -> Vec<Vec<u32>> {
 }
 
 /// Cell list with cells as wide as the radius.
-fn radius_lists(positions: &[[f64; 3]], radius: f64) -> Vec<Vec<u32>> {
+fn radius_lists(positions: &[[f64; 3]], radius: f64, lattice: &Lattice) -> Vec<Vec<u32>> {
     // Round-off in the coordinates must not make a list asymmetric or drop a lattice shell.
     let radius = radius * (1.0 + 1e-9);
     let cell = |x: &[f64; 3]| x.map(|v| (v / radius).floor() as i64);
@@ -131,6 +132,16 @@ fn radius_lists(positions: &[[f64; 3]], radius: f64) -> Vec<Vec<u32>> {
         cells.entry(cell(x)).or_default().push(i as u32);
     }
     let reach = radius * radius;
+    // Particles on two sides of a gap or a notch are no neighbours: what lies between must be body.
+    let whole = lattice.is_box();
+    let samples = (2.0 * radius / lattice.smallest_spacing()).ceil() as usize;
+    let joined = |x: [f64; 3], y: [f64; 3]| {
+        whole
+            || (0..samples).all(|i| {
+                let s = (i as f64 + 0.5) / samples as f64;
+                lattice.contains(std::array::from_fn(|a| x[a] + s * (y[a] - x[a])))
+            })
+    };
     parallel::fill(positions.len(), |i| {
         let (x, centre) = (positions[i], cell(&positions[i]));
         let mut list = Vec::new();
@@ -142,7 +153,7 @@ fn radius_lists(positions: &[[f64; 3]], radius: f64) -> Vec<Vec<u32>> {
                         let d: f64 = (0..3)
                             .map(|a| (positions[b as usize][a] - x[a]).powi(2))
                             .sum();
-                        if b as usize != i && d <= reach {
+                        if b as usize != i && d <= reach && joined(x, positions[b as usize]) {
                             list.push(b);
                         }
                     }

@@ -31,7 +31,7 @@ use crate::scene::{Numerics, ReferenceUpdate, Weights};
 #[derive(Debug)]
 pub struct Slices {
     /// First entry of each slice.
-    start: Vec<u32>,
+    start: Vec<usize>,
     /// Slot of the neighbour of the slice's first lane.
     base: Vec<u32>,
     /// k of the initial configuration per lane; 0 where a lane has no neighbour in this entry.
@@ -44,7 +44,7 @@ impl Slices {
     #[inline(always)]
     pub fn of(&self, a: usize) -> NeighboursOf<'_> {
         let (slice, lane) = ((a - Layout::FIRST) / SLICE, (a - Layout::FIRST) % SLICE);
-        let entries = self.start[slice] as usize..self.start[slice + 1] as usize;
+        let entries = self.start[slice]..self.start[slice + 1];
         NeighboursOf {
             base: self.base[entries.clone()].iter(),
             pair: entries.start * SLICE + lane,
@@ -81,7 +81,7 @@ impl Slices {
                     .map(|o| (Layout::slot(first) as i64 + o) as u32),
             );
             this.weight.resize(this.base.len(), Slots([0.0; SLICE]));
-            this.start.push(this.base.len() as u32);
+            this.start.push(this.base.len());
         }
         this
     }
@@ -89,7 +89,7 @@ impl Slices {
     /// Pair index of an existing pair.
     fn entry(&self, a: usize, b: usize) -> usize {
         let (slice, lane) = (a / SLICE, a % SLICE);
-        let range = self.start[slice] as usize..self.start[slice + 1] as usize;
+        let range = self.start[slice]..self.start[slice + 1];
         let base = (Layout::slot(b) - lane) as u32;
         let at = self.base[range.clone()]
             .binary_search(&base)
@@ -484,7 +484,7 @@ impl Reference {
         let entries = |slab: usize| {
             let first = slab * self.layout.slab;
             let last = (first + self.layout.slab).min(self.layout.slices);
-            self.slices.start[first] as usize..self.slices.start[last] as usize
+            self.slices.start[first]..self.slices.start[last]
         };
         let mut outputs = Vec::new();
         {
@@ -534,7 +534,7 @@ impl Reference {
             0
         };
         entries * (size_of::<Slots>() + size_of::<u32>())
-            + self.slices.start.len() * size_of::<u32>()
+            + self.slices.start.len() * size_of::<usize>()
             + self.x_initial.bytes()
             + self.volume.bytes()
             + self.l.bytes()
@@ -651,7 +651,7 @@ impl Work for PulledBackVectors<'_> {
     fn run<T: Lane>(mut self, token: T::Token) {
         let this = self.this;
         let (first, slices) = this.layout.slab_range(self.slab);
-        let offset = this.slices.start[self.slab * this.layout.slab] as usize * SLICE;
+        let offset = this.slices.start[self.slab * this.layout.slab] * SLICE;
         let (weights, volume) = (this.slices.weights(), this.volume.components()[0]);
         let per_length = T::splat(token, 1.0 / self.unit);
         let per_volume = T::splat(token, 1.0 / (self.mean_volume * self.mean_volume));

@@ -14,7 +14,7 @@ use crate::neighbours::Graph;
 use crate::parallel::{self, Pool};
 use crate::particles::Particles;
 use crate::plan::Plan;
-use crate::reference::Reference;
+use crate::reference::{Reference, Updated};
 use crate::scene::{Numerics, ReferenceUpdate, Scene};
 use crate::snapshot::Snapshot;
 
@@ -218,7 +218,15 @@ impl Simulation {
         };
         this.boundary
             .constrain(&mut this.state.v, 0.0, &this.inputs)?;
-        this.evaluate()?;
+        this.evaluate().map_err(|e| {
+            let place = e.place().clone();
+            let error = Error::scene(
+                "initial",
+                "a particle is inverted or moves at a speed that is not finite from the start: \
+                 check the displacement and the velocity",
+            );
+            error.at_particle(place.particle.unwrap_or(0), place.position)
+        })?;
         this.accounts.initial = this.evaluation.kinetic + this.evaluation.strain;
         this.resultants = this.compute_resultants()?;
         // A load that has no finite value at the start is an error of the scene, not of its first step.
@@ -300,10 +308,14 @@ impl Simulation {
     /// Largest stable step from the present state [s]: the scene's fixed step, or
     /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63).
     pub fn stable_step(&self) -> f64 {
-        let numerics = &self.scene.numerics;
-        numerics.time_step.unwrap_or_else(|| {
-            numerics.cfl_number() * self.evaluation.length / self.url.wave_speeds().pressure
-        })
+        let linear = self.cfl_number() * self.evaluation.length / self.url.wave_speeds().pressure;
+        self.scene.numerics.time_step.unwrap_or(linear)
+    }
+
+    /// The CFL number alpha of the scene, or the default for its neighbours.
+    pub fn cfl_number(&self) -> f64 {
+        let (_, most) = self.reference.neighbour_range;
+        self.scene.numerics.cfl_number(most)
     }
 
     /// Advances to exactly `t_next`, in as many stable steps as needed.
@@ -331,10 +343,21 @@ impl Simulation {
             ))
             .at_time(self.time));
         }
-        self.take_over_inputs()?;
+        let (steps, accounts) = (self.steps, self.accounts);
+        let velocity = self.take_over_inputs()?;
         let outcome = self.steps_until(t_next, observer);
-        self.resultants = self.compute_resultants()?;
-        outcome
+        if let (Err(_), Some(velocity)) = (&outcome, velocity)
+            && self.steps == steps
+        {
+            // Not one step was made: the impulse of the inputs is taken back with it.
+            self.state.v = velocity;
+            self.accounts = accounts;
+            self.evaluate()?;
+        }
+        let resultants = self.compute_resultants();
+        outcome?;
+        self.resultants = resultants?;
+        Ok(())
     }
 
     fn steps_until(
@@ -344,7 +367,8 @@ impl Simulation {
     ) -> Result<()> {
         while self.time < t_next {
             let (stable, remaining) = (self.stable_step(), t_next - self.time);
-            let last = remaining <= stable;
+            // Round-off in t_next - t must not split a step of exactly this size.
+            let last = remaining <= stable * (1.0 + 1e-9);
             // Two equal steps instead of a full one and a splinter.
             let dt = if last {
                 remaining
@@ -423,6 +447,10 @@ impl Simulation {
                 let stage_time = time + stage.time * dt;
                 let share = stage.weight * dt;
                 if let Some(before) = &mut before {
+                    if i == 0 {
+                        // What an abandoned step left here must not matter, not even as 0 x NaN.
+                        before.copy_from(&start.v);
+                    }
                     let factors = ANGULAR_ARMS[i].map(|c| c * dt);
                     let density = url.law().density();
                     let power = angular_momentum::project(
@@ -481,20 +509,30 @@ impl Simulation {
         Ok(())
     }
 
-    /// An external velocity that was set since the last step acts at once, as an impulse.
-    fn take_over_inputs(&mut self) -> Result<()> {
+    /// An external velocity that was set since the last step acts at once, as an impulse; the
+    /// velocities before it.
+    fn take_over_inputs(&mut self) -> Result<Option<Array<3>>> {
+        let driven = |i: &Input| i.quantity == Quantity::Velocity;
+        if !self.boundary.inputs.iter().any(driven) {
+            return Ok(None);
+        }
         let held = self.boundary.constrained_kinetic(&self.state.v);
         let old = self.state.v.clone();
         let changed = self
             .boundary
             .constrain(&mut self.state.v, self.time, &self.inputs)
             .inspect_err(|_| self.state.v.copy_from(&old))?;
-        if changed {
-            self.accounts.external_work += self.boundary.constrained_kinetic(&self.state.v) - held;
-            self.generation += 1;
-            self.evaluate()?;
+        if !changed {
+            return Ok(None);
         }
-        Ok(())
+        if let Err(error) = self.evaluate() {
+            self.state.v = old;
+            self.evaluate()?;
+            return Err(error);
+        }
+        self.accounts.external_work += self.boundary.constrained_kinetic(&self.state.v) - held;
+        self.generation += 1;
+        Ok(Some(old))
     }
 
     fn compute_resultants(&self) -> Result<Vec<Resultant>> {
@@ -723,10 +761,11 @@ impl Simulation {
                 "the snapshot belongs to another scene: restore it into a simulation of its own scene",
             ));
         }
+        let shape = |u: &Option<Updated>| u.as_ref().map(|u| u.h_chi.is_some());
         let same_shape = snapshot.state.x.layout() == self.state.x.layout()
             && snapshot.state.h.is_some() == self.state.h.is_some()
             && snapshot.state.j.is_some() == self.state.j.is_some()
-            && snapshot.updated.is_some() == self.reference.updated.is_some()
+            && shape(&snapshot.updated) == shape(&self.reference.updated)
             && snapshot.inputs.len() == self.inputs.len()
             && snapshot.time.is_finite();
         if !same_shape {
@@ -735,15 +774,24 @@ impl Simulation {
                 "the snapshot does not have the fields of its scene: it is damaged",
             ));
         }
-        let now = self.snapshot();
-        self.put(snapshot)
-            .inspect_err(|_| self.put(&now).expect("the present state was good"))
-    }
-
-    fn put(&mut self, snapshot: &Snapshot) -> Result<()> {
         for (index, values) in snapshot.inputs.iter().enumerate() {
             self.boundary.check_input(index, values)?;
         }
+        let now = self.snapshot();
+        let restored = self.put(snapshot).and_then(|()| self.compute_resultants());
+        match restored {
+            Ok(resultants) => {
+                self.resultants = resultants;
+                Ok(())
+            }
+            Err(error) => {
+                self.put(&now)?;
+                Err(error)
+            }
+        }
+    }
+
+    fn put(&mut self, snapshot: &Snapshot) -> Result<()> {
         self.time = snapshot.time;
         self.steps = snapshot.steps;
         self.accounts = snapshot.accounts;
@@ -763,9 +811,7 @@ impl Simulation {
             })?;
         }
         self.generation += 1;
-        self.evaluate()?;
-        self.resultants = self.compute_resultants()?;
-        Ok(())
+        self.evaluate()
     }
 
     /// Hash of the complete state: equal states have equal hashes, whatever the number of threads.
@@ -836,16 +882,20 @@ fn is_stale(numerics: &Numerics, steps: u64) -> bool {
 }
 
 fn diverged(b: Breakdown, state: &State, order: &[u32], time: f64) -> Error {
+    let (field, what) = if b.jacobian.is_nan() {
+        (Field::Velocity, "a velocity is not finite".to_string())
+    } else {
+        let what = format!("the volume ratio of a particle is {:.3e}", b.jacobian);
+        (Field::Jacobian, what)
+    };
     Error::new(
         Code::Diverged,
         format!(
-            "the solution broke down: the volume ratio of a particle is {:.3e}. The state before \
-             this step is kept. Try a smaller time step (numerics.cfl), a finer spacing, more \
-             neighbours, or a smaller load",
-            b.jacobian
+            "the solution broke down: {what}. The state before this step is kept. Try a smaller \
+             time step (numerics.cfl), a finer spacing, more neighbours, or a smaller load"
         ),
     )
-    .at_field(Field::Jacobian.info().name)
+    .at_field(field.info().name)
     .at_particle(
         order[b.slot - Layout::FIRST] as usize,
         Some(state.x.get(b.slot)),

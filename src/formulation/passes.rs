@@ -2,7 +2,7 @@
 
 use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
-use super::url::{Breakdown, Scratch, State};
+use super::url::{Breakdown, Scratch, State, is_admissible};
 use crate::lane::{Lane, SLICE, Work};
 use crate::layout::Array;
 use crate::material::{Deformation, Material};
@@ -121,8 +121,8 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
 pub(super) struct PointOutput<'a> {
     pub grad_v: [&'a mut [f64]; 9],
     pub q: [&'a mut [f64]; 9],
-    pub s: [&'a mut [f64]; 9],
-    pub half_grad: [&'a mut [f64]; 9],
+    pub s: Option<[&'a mut [f64]; 9]>,
+    pub half_grad: Option<[&'a mut [f64]; 9]>,
     pub wave: [&'a mut [f64]; 2],
     pub sigma_j: Option<&'a mut [f64]>,
 }
@@ -175,13 +175,11 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
             // 1/2 grad_chi v f^-1, f^-1 from f itself.
             let f = load9::<T>(token, &kinematics.f, a);
             let cof_f = cofactor(&f);
-            let factor = half / dot(f[0], cof_f[0]);
-            let grad = load_slab9::<T>(token, &out.grad_v, at);
-            store9(
-                &scale9(factor, &mat_mul_t(&grad, &cof_f)),
-                &mut out.half_grad,
-                at,
-            );
+            if let Some(half_grad) = &mut out.half_grad {
+                let factor = half / dot(f[0], cof_f[0]);
+                let grad = load_slab9::<T>(token, &out.grad_v, at);
+                store9(&scale9(factor, &mat_mul_t(&grad, &cof_f)), half_grad, at);
+            }
 
             // Q = V_R P F_chi^T L and S = V_chi h L.
             let mut k = scale9(v_r, &l);
@@ -191,27 +189,33 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
                 v_chi = v_r * T::load(token, j_chi, a);
             }
             store9(&mat_mul(&stress.p, &k), &mut out.q, at);
-            let h = match (STATE, &kinematics.h) {
-                (2.., Some(h)) => load9(token, h, a),
-                _ => cof_f,
-            };
-            store9(&scale9(v_chi, &mat_mul(&h, &l)), &mut out.s, at);
+            if let Some(out) = &mut out.s {
+                let h = match (STATE, &kinematics.h) {
+                    (2.., Some(h)) => load9(token, h, a),
+                    _ => cof_f,
+                };
+                store9(&scale9(v_chi, &mat_mul(&h, &l)), out, at);
+            }
             if let Some(sigma_j) = &mut out.sigma_j {
                 stress.sigma_j.store(sigma_j, at);
             }
 
             let velocity = load3::<T>(token, &v, a);
             (v_r * stress.energy).for_lanes(|_, energy| strain += energy);
-            (half * density * v_r * dot(velocity, velocity))
-                .for_lanes(|_, energy| kinetic += energy);
-            total.j.min(det).for_lanes(|lane, jacobian| {
-                if breakdown.is_none() && !(jacobian > 0.0 && jacobian < f64::INFINITY) {
-                    breakdown = Some(Breakdown {
-                        slot: a + lane,
-                        jacobian,
-                    });
+            // A velocity that is not finite is a breakdown too: it would spoil J one step later.
+            let motion = half * density * v_r * dot(velocity, velocity);
+            motion.for_lanes(|_, energy| kinetic += energy);
+            let mut check = |lane: usize, jacobian: f64| {
+                if breakdown.is_none() && !is_admissible(jacobian) {
+                    let slot = a + lane;
+                    breakdown = Some(Breakdown { slot, jacobian });
                 }
-            });
+            };
+            det.for_lanes(&mut check);
+            if STATE >= 1 {
+                total.j.for_lanes(&mut check);
+            }
+            (motion - motion).for_lanes(|lane, zero| check(lane, 1.0 + zero));
         }
         breakdown.map_or(Ok((strain, kinetic)), Err)
     }
@@ -279,8 +283,11 @@ impl<'a> ForceInput<'a> {
             x: state.x.components(),
             v: state.v.components(),
             q: scratch.q.components(),
-            s: scratch.s.components(),
-            half_grad: scratch.half_grad.components(),
+            s: scratch.s.as_ref().map_or([&[]; 9], Array::components),
+            half_grad: scratch
+                .half_grad
+                .as_ref()
+                .map_or([&[]; 9], Array::components),
             wave: scratch.wave.components(),
         }
     }
@@ -352,8 +359,13 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
             let qa = load9::<T>(token, &input.q, a);
-            let sa = load9::<T>(token, &input.s, a);
-            let grad_a = load9::<T>(token, &input.half_grad, a);
+            let (mut sa, mut grad_a) = ([zero3(token); 3], [zero3(token); 3]);
+            if MODE != riemann::OFF {
+                sa = load9::<T>(token, &input.s, a);
+            }
+            if MODE == riemann::LINEAR || MODE == riemann::MINMOD {
+                grad_a = load9::<T>(token, &input.half_grad, a);
+            }
             let mut force = zero3::<T>(token);
             let mut work = T::splat(token, 0.0);
             let mut length2 = far;

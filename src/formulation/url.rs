@@ -53,10 +53,10 @@ pub struct Rates {
 pub(super) struct Scratch {
     /// Q_a.
     pub q: Array<9>,
-    /// S_a.
-    pub s: Array<9>,
+    /// S_a; only where a dissipation is on.
+    pub s: Option<Array<9>>,
     /// Half the spatial velocity gradient, 1/2 grad_chi v f^-1, limited if a limiter is on [1/s].
-    pub half_grad: Array<9>,
+    pub half_grad: Option<Array<9>>,
     /// (smallest stretch, spatial density).
     pub wave: Array<2>,
     /// Sigma_J [Pa] and half its spatial gradient [Pa/m]; only where D^j is on.
@@ -162,8 +162,9 @@ impl Url {
             },
             scratch: Scratch {
                 q: Array::new(layout, [0.0; 9]),
-                s: Array::new(layout, [0.0; 9]),
-                half_grad: Array::new(layout, [0.0; 9]),
+                s: (mode != riemann::OFF || volume).then(|| Array::new(layout, [0.0; 9])),
+                half_grad: matches!(mode, riemann::LINEAR | riemann::MINMOD)
+                    .then(|| Array::new(layout, [0.0; 9])),
                 wave: Array::new(layout, [1.0; 2]),
                 sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
             },
@@ -232,9 +233,11 @@ impl Url {
             total.strain += strain;
             total.kinetic += kinetic;
         }
-        if self.options.venkatakrishnan {
+        if self.options.venkatakrishnan
+            && let Some(half_grad) = &mut self.scratch.half_grad
+        {
             let (x, v) = (state.x.components(), state.v.components());
-            parallel::map_slabs(self.scratch.half_grad.slabs_mut(), |slab, half_grad| {
+            parallel::map_slabs(half_grad.slabs_mut(), |slab, half_grad| {
                 R::run(Limit {
                     reference,
                     x,
@@ -270,6 +273,11 @@ impl Url {
         let v = state.v.components();
         let kinematics = Kinematics::new(state, reference);
         let updated = reference.updated.is_some();
+        let mut s = scratch.s.as_mut().map(|s| s.slabs_mut().into_iter());
+        let mut half_grad = scratch
+            .half_grad
+            .as_mut()
+            .map(|h| h.slabs_mut().into_iter());
         let mut sigma_j = scratch
             .sigma_j
             .as_mut()
@@ -279,10 +287,10 @@ impl Url {
             .slabs_mut()
             .into_iter()
             .zip(scratch.q.slabs_mut())
-            .zip(scratch.s.slabs_mut())
-            .zip(scratch.half_grad.slabs_mut())
             .zip(scratch.wave.slabs_mut())
-            .map(|((((grad_v, q), s), half_grad), wave)| {
+            .map(|((grad_v, q), wave)| {
+                let s = s.as_mut().and_then(Iterator::next);
+                let half_grad = half_grad.as_mut().and_then(Iterator::next);
                 let sigma_j = sigma_j.as_mut().and_then(Iterator::next).map(|[s]| s);
                 PointOutput {
                     grad_v,
@@ -501,11 +509,15 @@ impl Url {
                 if let Some(h_chi) = &mut h_chi {
                     store9(&total.h, h_chi, at);
                 }
-                if breakdown.is_none() && !(total.j > 0.0 && total.j < f64::INFINITY) {
-                    breakdown = Some(Breakdown {
-                        slot: first + at,
-                        jacobian: total.j,
-                    });
+                // Whatever an evaluation would refuse must not get into the reference.
+                let det = dot(total.f[0], cofactor(&total.f)[0]);
+                for jacobian in [total.j, det] {
+                    if breakdown.is_none() && !is_admissible(jacobian) {
+                        breakdown = Some(Breakdown {
+                            slot: first + at,
+                            jacobian,
+                        });
+                    }
                 }
             }
             breakdown
@@ -516,9 +528,9 @@ impl Url {
         new.chi.copy_from(&state.x);
         reference.updated = Some(new);
         if let Err(slot) = reference.rebuild() {
-            let jacobian = self.deformation(state, reference, slot).j;
             reference.updated = Some(old);
             reference.rebuild().expect("it could be built before");
+            let jacobian = self.deformation(state, reference, slot).j;
             return Err(Breakdown { slot, jacobian });
         }
         state.f = Array::new(layout, flat(&IDENTITY));
@@ -535,14 +547,19 @@ impl Url {
     pub fn bytes(&self) -> usize {
         let s = &self.scratch;
         s.q.bytes()
-            + s.s.bytes()
-            + s.half_grad.bytes()
+            + s.s.as_ref().map_or(0, Array::bytes)
+            + s.half_grad.as_ref().map_or(0, Array::bytes)
             + s.wave.bytes()
             + s.sigma_j.as_ref().map_or(0, |(a, b)| a.bytes() + b.bytes())
             + self.rates.force.bytes()
             + self.rates.grad_v.bytes()
             + self.rates.j_dissipation.as_ref().map_or(0, Array::bytes)
     }
+}
+
+/// Whether a volume ratio is positive and finite.
+pub(super) fn is_admissible(jacobian: f64) -> bool {
+    jacobian > 0.0 && jacobian < f64::INFINITY
 }
 
 /// Gradient of a vector field with respect to the reference, for one slab.

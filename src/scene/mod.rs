@@ -253,14 +253,10 @@ impl Default for Numerics {
 }
 
 impl Numerics {
-    /// The CFL number: the scene's, or the largest that is proven stable for its neighbours.
-    pub fn cfl_number(&self) -> f64 {
-        self.cfl
-            .unwrap_or(if self.neighbours == Neighbours::Lattice(6) {
-                0.6
-            } else {
-                0.9
-            })
+    /// The CFL number: the scene's, or the one that is proven stable for the largest number of
+    /// neighbours of a particle.
+    pub fn cfl_number(&self, neighbours: usize) -> f64 {
+        self.cfl.unwrap_or(if neighbours <= 6 { 0.6 } else { 0.9 })
     }
 }
 
