@@ -270,6 +270,22 @@ pub fn vectorised<W: Work>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(Dispatch(work))
 }
 
+/// Runs `work` on the AVX2 instructions, for the tests; `None` where the processor has none.
+#[cfg(all(test, target_arch = "x86_64"))]
+pub fn on_avx2<W: Work>(work: W) -> Option<W::Output> {
+    use pulp::WithSimd;
+    struct Inside<W>(W, pulp::x86::V3);
+    impl<W: Work> pulp::NullaryFnOnce for Inside<W> {
+        type Output = W::Output;
+        #[inline(always)]
+        fn call(self) -> W::Output {
+            Dispatch(self.0).with_simd(self.1)
+        }
+    }
+    let avx2 = pulp::x86::V3::try_new()?;
+    Some(avx2.vectorize(Inside(work, avx2)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

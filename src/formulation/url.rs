@@ -627,6 +627,17 @@ mod tests {
         }
     }
 
+    /// The narrower vectors, where the processor has the widest.
+    #[cfg(target_arch = "x86_64")]
+    struct Avx2;
+
+    #[cfg(target_arch = "x86_64")]
+    impl Runner for Avx2 {
+        fn run<W: Work>(work: W) -> W::Output {
+            crate::lane::on_avx2(work).expect("checked by the test")
+        }
+    }
+
     fn body(overrides: &[&str]) -> (Reference, State, Url) {
         let text = r#"{
             "geometry": {"boxes": {
@@ -703,16 +714,24 @@ mod tests {
                 (url.rates.force.clone(), url.rates.grad_v.clone(), j)
             };
             let kept = rates(&url);
+            let check = |again: std::result::Result<Evaluation, Breakdown>, url: &Url| {
+                let again = again.expect("a good state");
+                assert!(kept == rates(url), "rates differ with {overrides:?}");
+                assert_eq!(
+                    format!("{wide:?}"),
+                    format!("{again:?}"),
+                    "with {overrides:?}"
+                );
+            };
             url.rates.force = Array::new(reference.layout, [0.0; 3]);
-            let single = url
-                .evaluate_on::<OneByOne>(&state, &reference)
-                .expect("a good state");
-            assert!(kept == rates(&url), "rates differ with {overrides:?}");
-            assert_eq!(
-                format!("{wide:?}"),
-                format!("{single:?}"),
-                "with {overrides:?}"
-            );
+            let single = url.evaluate_on::<OneByOne>(&state, &reference);
+            check(single, &url);
+            #[cfg(target_arch = "x86_64")]
+            if pulp::x86::V3::try_new().is_some() {
+                url.rates.force = Array::new(reference.layout, [0.0; 3]);
+                let narrow = url.evaluate_on::<Avx2>(&state, &reference);
+                check(narrow, &url);
+            }
         }
     }
 
