@@ -13,6 +13,10 @@ const PREAMBLE: &str = "\
 
 Written by `cargo xtask validate`; the quick comparisons are in `cargo test --release --test acceptance`.
 
+The period and the amplitude of a history are fitted to all of the reference; what remains is its rest.
+The extrema are also listed one by one; where a history is flat (bending), short waves of small amplitude
+move the time of its extremum, and the fit tells the error of the phase better.
+
 ";
 
 pub fn validate(sh: &Shell) -> Result<()> {
