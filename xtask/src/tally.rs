@@ -42,6 +42,11 @@ impl Tally {
     /// pytest), shows that output, and adds the numbers up. A command that fails without a
     /// failed test, or passes without any test, counts as a failed one.
     pub fn run(command: impl Into<Command>) -> Result<Self> {
+        Self::run_and_read(command, |_| ())
+    }
+
+    /// The same, and hands on every line of the output.
+    pub fn run_and_read(command: impl Into<Command>, mut read: impl FnMut(&str)) -> Result<Self> {
         let mut command: Command = command.into();
         let mut child = command
             .stdout(Stdio::piped())
@@ -54,6 +59,7 @@ impl Tally {
             let line = line?;
             let line = String::from_utf8_lossy(&line);
             writeln!(shown, "{line}")?;
+            read(&line);
             tally += Self::parse(&line).unwrap_or_default();
         }
         let status = child.wait()?;

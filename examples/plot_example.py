@@ -1,0 +1,226 @@
+"""The picture of an example: deformed particles coloured by pressure, and histories.
+
+    urlsph run examples/CASE/scene.json --out RUN --set output.field_interval=DT
+    python examples/plot_example.py CASE RUN [PICTURE.png]
+
+Needs matplotlib and meshio (`ffi-tests/requirements.txt`).
+"""
+
+import argparse
+import csv
+import math
+import xml.etree.ElementTree
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import matplotlib.ticker
+import meshio
+import numpy as np
+from PIL import Image
+
+EXAMPLES = Path(__file__).parent
+
+plt.rcParams.update(
+    {
+        "font.size": 9,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "grid.alpha": 0.3,
+        "legend.frameon": False,
+        "lines.linewidth": 1.4,
+    }
+)
+
+
+def top_corner_angle(history):
+    """Unwrapped angle of the top corner about Y [degrees]."""
+    x = 0.5 + history["probe.top_corner.displacement[1]"]
+    z = 0.5 + history["probe.top_corner.displacement[3]"]
+    return np.degrees(np.unwrap(np.arctan2(x, z))) - 45
+
+
+def column(name):
+    """A column of a history."""
+    return lambda history: history[name]
+
+
+def length(name):
+    """The Euclidean norm of a vector in a history."""
+    return lambda history: np.linalg.norm([history[f"{name}[{i}]"] for i in (1, 2, 3)], axis=0)
+
+
+class Example:
+    """What is drawn: times of the particles, curves, how much displacements are enlarged."""
+
+    def __init__(self, times, curves, label, *, enlarge=1, gap=1.2, azimuth=25, size=1.0):
+        self.times, self.curves, self.label = times, curves, label
+        self.enlarge, self.gap, self.azimuth, self.size = enlarge, gap, azimuth, size
+
+
+# Curves: the name in the legend, how it is got from history.csv, its column of expected.csv.
+CASES = {
+    "column_bending": Example(
+        [0.0, 0.12, 0.25, 0.46, 0.93, 1.38],
+        [
+            (f"$u_{axis}$ of the top corner", column(name), name)
+            for axis, name in (
+                ("x", "probe.top_corner.displacement[1]"),
+                ("y", "probe.top_corner.displacement[2]"),
+            )
+        ],
+        "displacement [m]",
+        gap=0.3,
+    ),
+    "column_tension": Example(
+        [0.0, 0.02, 0.045, 0.085, 0.125, 0.165],
+        [
+            (
+                "$u_y$ of the top",
+                column("probe.top_centre.displacement[2]"),
+                "probe.top_centre.displacement[2]",
+            )
+        ],
+        "displacement [m]",
+    ),
+    "column_twisting": Example(
+        [0.0, 0.03, 0.06, 0.09, 0.17, 0.25],
+        [("angle of a top corner", top_corner_angle, "angle_deg")],
+        "angle [degrees]",
+    ),
+    "elastic_cube": Example(
+        [0.0, 0.004, 0.008, 0.012, 0.016],
+        [
+            (
+                "$u_x$ at (1, 0, 0)",
+                column("probe.x_face_centre.displacement[1]"),
+                "probe.x_face_centre.displacement[1]",
+            )
+        ],
+        "displacement [m]",
+        enlarge=4e5,
+        gap=0.4,
+        azimuth=205,
+    ),
+    "l_block": Example(
+        [0.0, 5.0, 10.0, 15.0, 20.0],
+        [
+            ("angular momentum", length("momentum.angular"), None),
+            ("linear momentum times 1 m", length("momentum.linear"), None),
+        ],
+        "[kg m²/s]",
+        gap=2.0,
+        size=1.35,
+    ),
+}
+
+
+def read_table(path):
+    """Columns of a CSV file by name."""
+    with open(path, newline="") as file:
+        rows = list(csv.reader(file))
+    values = np.array(rows[1:], dtype=float)
+    return {name: values[:, i] for i, name in enumerate(rows[0])}
+
+
+def read_fields(folder, time):
+    """The written state nearest to a time: time, initial positions, displacements, pressures."""
+    sets = xml.etree.ElementTree.parse(folder / "fields.pvd").iter("DataSet")
+    nearest = min(sets, key=lambda s: abs(float(s.get("timestep")) - time))
+    mesh = meshio.read(folder / nearest.get("file"))
+    displacement = mesh.point_data["displacement"]
+    pressure = mesh.point_data["pressure"].ravel()
+    return float(nearest.get("timestep")), mesh.points - displacement, displacement, pressure
+
+
+def project(points, azimuth):
+    """Parallel projection with y up: right, up and towards the eye."""
+    turn, tilt = math.radians(azimuth), math.radians(18)
+    x, y, z = points.T
+    right = x * math.cos(turn) - z * math.sin(turn)
+    front = x * math.sin(turn) + z * math.cos(turn)
+    return right, y * math.cos(tilt) - front * math.sin(tilt), y * math.sin(tilt) + front * math.cos(tilt)
+
+
+def draw_particles(figure, axes, example, folder):
+    """States side by side, far particles first."""
+    states = [read_fields(folder, time) for time in example.times]
+    most = np.quantile(np.abs(np.concatenate([state[3] for state in states])), 0.99)
+    unit, scale = ("Pa", 1) if most < 1e3 else ("kPa", 1e3) if most < 1e6 else ("MPa", 1e6)
+    initial = states[0][1]
+    spacing = np.diff(np.unique(initial[:, 0].round(6)))[0]
+    offset, clouds = 0.0, []
+    for time, start, displacement, pressure in states:
+        right, up, depth = project(start + example.enlarge * displacement, example.azimuth)
+        shift = offset - right.min()
+        offset += right.max() - right.min() + example.gap
+        order = np.argsort(depth)
+        clouds.append(
+            axes.scatter(
+                (right + shift)[order], up[order], c=pressure[order] / scale, cmap="coolwarm",
+                vmin=-most / scale, vmax=most / scale, linewidths=0.15, edgecolors="#00000055",
+            )
+        )
+        axes.annotate(
+            f"{time:g} s", ((right + shift).mean(), up.min()), (0, -8),
+            textcoords="offset points", ha="center", va="top", fontsize=8,
+        )
+    axes.set_aspect("equal")
+    axes.axis("off")
+    axes.margins(0.03, 0.06)
+    figure.canvas.draw()
+    # A little more than the spacing, so that the surface is closed.
+    dots = axes.transData.transform([[spacing, 0], [0, 0]])
+    diameter = 1.15 * example.size * (dots[0, 0] - dots[1, 0]) * 72 / figure.dpi
+    for cloud in clouds:
+        cloud.set_sizes([diameter**2])
+    bar = figure.colorbar(clouds[0], ax=axes, shrink=0.75, pad=0.01, aspect=25)
+    bar.set_label(f"pressure [{unit}]")
+    bar.outline.set_visible(False)
+    if example.enlarge != 1:
+        axes.set_title(f"displacements enlarged {example.enlarge:,.0f} times", fontsize=9)
+
+
+def draw_curves(axes, example, history, expected):
+    """Histories with the reference behind them."""
+    for i, (name, measure, reference) in enumerate(example.curves):
+        if expected is not None and reference is not None:
+            end = expected["time"] <= history["time"][-1] * (1 + 1e-9)
+            axes.plot(
+                expected["time"][end], expected[reference][end], color="#b0b0b0", linewidth=4,
+                label="reference" if i == 0 else None,
+            )
+        axes.plot(history["time"], measure(history), color=("#1f5fa8", "#d9822b")[i], label=name)
+    axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(5))
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(example.label)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.16), ncols=3, columnspacing=1.2)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("case", choices=CASES)
+    parser.add_argument("run", type=Path, help="folder written by `urlsph run`")
+    parser.add_argument("picture", type=Path, nargs="?", help="default: picture.png of the example")
+    arguments = parser.parse_args()
+    example = CASES[arguments.case]
+    expected = EXAMPLES / arguments.case / "expected.csv"
+    history = read_table(arguments.run / "history.csv")
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(10, 3.8), dpi=110, width_ratios=(1.5, 1), layout="constrained"
+    )
+    draw_curves(right, example, history, read_table(expected) if expected.exists() else None)
+    draw_particles(figure, left, example, arguments.run)
+    figure.canvas.draw()
+    # A palette makes the file a third as large; coverage keeps the rare ends of the colour bar.
+    picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
+    picture = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE)
+    picture.save(arguments.picture or EXAMPLES / arguments.case / "picture.png", optimize=True)
+
+
+if __name__ == "__main__":
+    main()
