@@ -246,6 +246,38 @@ impl<S: Simd> Lane for Wide<S> {
     }
 }
 
+/// A running sum or minimum by the place in a slice, so that its order, and with it the bits, do not
+/// depend on the width of the vectors.
+#[derive(Clone, Copy)]
+pub struct PerSlot([f64; SLICE]);
+
+impl PerSlot {
+    /// Starts everywhere with `value`.
+    pub fn new(value: f64) -> Self {
+        Self([value; SLICE])
+    }
+    /// Adds the value for the slots from `at`.
+    #[inline(always)]
+    pub fn add<T: Lane>(&mut self, at: usize, value: T) {
+        let sum = T::load(value.token(), &self.0, at % SLICE) + value;
+        sum.store(&mut self.0, at % SLICE);
+    }
+    /// Takes the minimum with the value for the slots from `at`; a value that is NaN is ignored.
+    #[inline(always)]
+    pub fn min<T: Lane>(&mut self, at: usize, value: T) {
+        let least = value.min(T::load(value.token(), &self.0, at % SLICE));
+        least.store(&mut self.0, at % SLICE);
+    }
+    /// Sum over the slice.
+    pub fn sum(&self) -> f64 {
+        self.0.iter().sum()
+    }
+    /// Minimum over the slice.
+    pub fn least(&self) -> f64 {
+        self.0.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}
+
 /// Work on the slices of a slab, written once over lanes.
 pub trait Work {
     /// What it returns.

@@ -47,7 +47,13 @@ pub struct Simulation {
     evaluation: Evaluation,
     resultants: Vec<Resultant>,
     generation: u64,
+    /// Stable step at time 0 [s].
+    first_step: f64,
 }
+
+/// Share of the first stable step below which a body counts as broken. A compression to a thousandth
+/// of each particle's size is far beyond what the particles resolve, and going on would not end.
+const SMALLEST_STEP: f64 = 1e-6;
 
 /// Named points and the particles that they are interpolated from.
 #[derive(Debug)]
@@ -214,6 +220,7 @@ impl Simulation {
             evaluation: Evaluation::default(),
             resultants: Vec::new(),
             generation: 0,
+            first_step: 0.0,
             scene,
         };
         this.boundary
@@ -227,6 +234,7 @@ impl Simulation {
             );
             error.at_particle(place.particle.unwrap_or(0), place.position)
         })?;
+        this.first_step = this.stable_step();
         this.accounts.initial = this.evaluation.kinetic + this.evaluation.strain;
         this.resultants = this.compute_resultants()?;
         // A load that has no finite value at the start is an error of the scene, not of its first step.
@@ -376,7 +384,7 @@ impl Simulation {
                 stable.min(0.5 * remaining)
             };
             let time = if last { t_next } else { self.time + dt };
-            if time <= self.time {
+            if time <= self.time || stable < SMALLEST_STEP * self.first_step {
                 return Err(Error::new(
                     Code::Diverged,
                     format!(

@@ -3,7 +3,7 @@
 use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
 use super::url::{Breakdown, Scratch, State, is_admissible};
-use crate::lane::{Lane, SLICE, Work};
+use crate::lane::{Lane, PerSlot, SLICE, Work};
 use crate::layout::Array;
 use crate::material::{Deformation, Material};
 use crate::math::*;
@@ -154,8 +154,10 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
         let (l, volume) = (reference.l.components(), reference.volume.components()[0]);
         let density = T::splat(token, law.density());
         let half = T::splat(token, 0.5);
-        let mut breakdown = None;
-        let (mut strain, mut kinetic) = (0.0, 0.0);
+        let (mut strain, mut kinetic) = (PerSlot::new(0.0), PerSlot::new(0.0));
+        let mut admissible = PerSlot::new(1.0);
+        let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
+        let infinity = T::splat(token, f64::INFINITY);
         for (at, a) in lanes_of::<T>(reference, slab) {
             let total = kinematics.total::<T, STATE, UPDATED>(token, a);
             let stress = law.stress(&total.f, &total.h, total.j);
@@ -201,24 +203,51 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
             }
 
             let velocity = load3::<T>(token, &v, a);
-            (v_r * stress.energy).for_lanes(|_, energy| strain += energy);
-            // A velocity that is not finite is a breakdown too: it would spoil J one step later.
+            strain.add(at, v_r * stress.energy);
             let motion = half * density * v_r * dot(velocity, velocity);
-            motion.for_lanes(|_, energy| kinetic += energy);
-            let mut check = |lane: usize, jacobian: f64| {
-                if breakdown.is_none() && !is_admissible(jacobian) {
-                    let slot = a + lane;
-                    breakdown = Some(Breakdown { slot, jacobian });
-                }
-            };
-            det.for_lanes(&mut check);
+            kinetic.add(at, motion);
+
+            // 1 where J and det F are positive and finite and the velocity is finite, else 0. A
+            // comparison with NaN is false, and infinity - infinity is NaN.
+            let mut good = (infinity - motion).if_positive(one, zero);
+            good = (infinity - det).if_positive(det.if_positive(good, zero), zero);
             if STATE >= 1 {
-                total.j.for_lanes(&mut check);
+                let j = total.j;
+                good = (infinity - j).if_positive(j.if_positive(good, zero), zero);
             }
-            (motion - motion).for_lanes(|lane, zero| check(lane, 1.0 + zero));
+            admissible.min(at, good);
         }
-        breakdown.map_or(Ok((strain, kinetic)), Err)
+        if admissible.least() < 1.0 {
+            return Err(first_breakdown::<STATE, UPDATED>(
+                &kinematics,
+                reference,
+                &v,
+                slab,
+            ));
+        }
+        Ok((strain.sum(), kinetic.sum()))
     }
+}
+
+/// The first particle of a slab that is not admissible.
+#[cold]
+fn first_breakdown<const STATE: u8, const UPDATED: bool>(
+    kinematics: &Kinematics,
+    reference: &Reference,
+    v: &[&[f64]; 3],
+    slab: usize,
+) -> Breakdown {
+    for (_, slot) in lanes_of::<f64>(reference, slab) {
+        let total = kinematics.total::<f64, STATE, UPDATED>((), slot);
+        let det = dot(total.f[0], cofactor(&total.f)[0]);
+        let velocity = load3::<f64>((), v, slot);
+        for jacobian in [total.j, det, 1.0 + 0.0 * dot(velocity, velocity)] {
+            if !is_admissible(jacobian) {
+                return Breakdown { slot, jacobian };
+            }
+        }
+    }
+    unreachable!("called for a slab with one")
 }
 
 /// Scales the gradients for the reconstruction by Venkatakrishnan's limiter.
@@ -354,7 +383,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             shear: T::splat(token, speeds.shear),
         };
         let far = T::splat(token, f64::INFINITY);
-        let (mut power, mut shortest) = (0.0, f64::INFINITY);
+        let (mut power, mut shortest) = (PerSlot::new(0.0), PerSlot::new(f64::INFINITY));
         for (at, a) in lanes_of::<T>(input.reference, slab) {
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
@@ -391,11 +420,11 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                 force = add3(force, f);
             }
             store3(&force, &mut out, at);
-            // Each pair is seen from both sides.
-            work.for_lanes(|_, w| power += 0.5 * w);
-            length2.for_lanes(|_, l| shortest = l.min(shortest));
+            power.add(at, work);
+            shortest.min(at, length2);
         }
-        (power, shortest)
+        // Each pair is seen from both sides.
+        (0.5 * power.sum(), shortest.least())
     }
 }
 
@@ -454,7 +483,7 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
             T::splat(token, self.pressure_speed),
             T::splat(token, self.coefficient),
         );
-        let mut power = 0.0;
+        let mut power = PerSlot::new(0.0);
         for (at, a) in lanes_of::<T>(input.reference, self.slab) {
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
@@ -480,9 +509,9 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
                 v_chi = v_chi * T::load(token, j_chi, a);
             }
             (rate / (v_chi + T::splat(token, f64::MIN_POSITIVE))).store(self.out, at);
-            work.for_lanes(|_, w| power += 0.5 * w);
+            power.add(at, work);
         }
-        power
+        0.5 * power.sum()
     }
 }
 
