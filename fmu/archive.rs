@@ -153,13 +153,16 @@ pub fn find_library() -> Result<PathBuf> {
     })?;
     let folder = program.parent().unwrap_or(Path::new(""));
     let name = library_name();
-    // Cargo leaves the library of the latest build in `deps`, beside the program or around it.
+    // Beside the program, in its prefix, or in Cargo's `deps`, where tests find the library of their
+    // build; where there are several, the newest goes with the program.
     let places = [
-        folder.join("deps").join(&name),
         folder.join(&name),
         folder.join("../lib").join(&name),
+        folder.join("deps").join(&name),
     ];
-    places.iter().find(|place| place.is_file()).cloned().ok_or_else(|| {
+    let modified = |place: &PathBuf| place.metadata().and_then(|m| m.modified()).ok();
+    let found = places.iter().filter(|place| place.is_file());
+    found.max_by_key(|place| modified(place)).cloned().ok_or_else(|| {
         let tried: Vec<_> = places.iter().map(|p| p.display().to_string()).collect();
         Error::new(
             Code::Io,

@@ -122,7 +122,7 @@ public:
         : handle_(std::exchange(other.handle_, nullptr)), calls_(std::move(other.calls_)) {}
     Simulation& operator=(Simulation&& other) noexcept {
         if (this != &other) {
-            urlsph_destroy(handle_);
+            release();
             handle_ = std::exchange(other.handle_, nullptr);
             calls_ = std::move(other.calls_);
         }
@@ -130,7 +130,7 @@ public:
     }
     Simulation(const Simulation&) = delete;
     Simulation& operator=(const Simulation&) = delete;
-    ~Simulation() { urlsph_destroy(handle_); }
+    ~Simulation() { release(); }
 
     /// The handle, for calls of urlsph.h; still owned by this object.
     urlsph_simulation* handle() const noexcept { return handle_; }
@@ -283,6 +283,12 @@ public:
     }
 
 private:
+    /// Destroys the simulation. While a call is under way on it, from a callback of its own say, it
+    /// stays, and with it what that call goes on using.
+    void release() noexcept {
+        if (urlsph_destroy(std::exchange(handle_, nullptr)) == URLSPH_BUSY) calls_.release();
+    }
+
     /// The callbacks at an address that stays, and what they threw.
     struct Calls {
         Callbacks callbacks;

@@ -134,8 +134,9 @@ fn radius_lists(positions: &[[f64; 3]], radius: f64, lattice: &Lattice) -> Vec<V
     let reach = radius * radius;
     // Particles on two sides of a gap or a notch are no neighbours: what lies between must be body.
     let whole = lattice.is_box();
-    let samples = (2.0 * radius / lattice.smallest_spacing()).ceil() as usize;
-    let joined = |x: [f64; 3], y: [f64; 3]| {
+    let spacing = lattice.smallest_spacing();
+    let joined = |x: [f64; 3], y: [f64; 3], distance: f64| {
+        let samples = (2.0 * distance / spacing).ceil() as usize;
         whole
             || (0..samples).all(|i| {
                 let s = (i as f64 + 0.5) / samples as f64;
@@ -153,7 +154,10 @@ fn radius_lists(positions: &[[f64; 3]], radius: f64, lattice: &Lattice) -> Vec<V
                         let d: f64 = (0..3)
                             .map(|a| (positions[b as usize][a] - x[a]).powi(2))
                             .sum();
-                        if b as usize != i && d <= reach && joined(x, positions[b as usize]) {
+                        if b as usize != i
+                            && d <= reach
+                            && joined(x, positions[b as usize], d.sqrt())
+                        {
                             list.push(b);
                         }
                     }

@@ -86,7 +86,7 @@ static urlsph_status run(urlsph_simulation *column, double *displacement, size_t
     }
 
     /* A field: particles x 3, row-major. */
-    urlsph_counts counts;
+    urlsph_counts counts = {0};
     TRY(urlsph_get_counts(column, &counts, sizeof counts));
     TRY(urlsph_read_field(column, field, displacement, room));
     double largest = 0.0;
@@ -144,7 +144,7 @@ int main(int argc, char **argv) {
     }
 
     /* The library writes into memory of ours. */
-    urlsph_counts counts;
+    urlsph_counts counts = {0};
     size_t bytes = 0;
     status = urlsph_get_counts(column, &counts, sizeof counts);
     if (status == URLSPH_OK) status = urlsph_get_snapshot_size(column, &bytes);

@@ -77,9 +77,13 @@ fn plain(message: &str) -> String {
     format!("{text}, expected {expected}")
 }
 
+/// Steps of an override's path; no scene is nearly as deep.
+const DEEPEST: usize = 32;
+
 /// Applies `path=value` to the tree.
 fn apply(tree: &mut Value, text: &str) -> Result<()> {
-    let wrong = |message: String| Error::argument(format!("override `{text}`: {message}"));
+    let shown: String = text.chars().take(200).collect();
+    let wrong = |message: String| Error::argument(format!("override `{shown}`: {message}"));
     let Some((path, value)) = text.split_once('=') else {
         return Err(wrong(
             "expected `path=value`, such as `geometry.box.spacing=0.125`".into(),
@@ -93,7 +97,13 @@ fn apply(tree: &mut Value, text: &str) -> Result<()> {
     };
     let mut node = tree;
     let mut rest = path;
+    let mut depth = 0;
     while !rest.is_empty() {
+        // What a path creates is also taken apart step by step, on the stack.
+        depth += 1;
+        if depth > DEEPEST {
+            return Err(wrong(format!("the path has more than {DEEPEST} steps")));
+        }
         let done = &path[..path.len() - rest.len()];
         let (step, after) = step(node, done, rest).map_err(wrong)?;
         let place = if done.is_empty() { "the scene" } else { done };

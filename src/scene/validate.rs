@@ -11,6 +11,8 @@ use crate::fields::{FIELDS, FieldInfo};
 
 /// Memory of a simulation per particle [bytes], with 18 neighbours.
 const BYTES_PER_PARTICLE: f64 = 1300.0;
+/// What a pair beyond the usual ones takes while the lists are built [bytes].
+const BYTES_PER_PAIR: f64 = 24.0;
 /// Particles are numbered in 32 bits, with room for flags.
 const MAX_PARTICLES: f64 = (1u64 << 31) as f64;
 /// Relative tolerance of comparisons between lengths that decimal input only meets up to round-off.
@@ -39,7 +41,7 @@ impl Scene {
         self.probes_inside()?;
         positive("time.end", self.time.end)?;
         output(&self.output)?;
-        capacity(&self.geometry, available_memory())
+        capacity(&self.geometry, self.numerics.neighbours, available_memory())
     }
 
     fn patches_and_conditions(&self) -> Result<()> {
@@ -439,18 +441,28 @@ fn output(output: &Output) -> Result<()> {
 }
 
 /// Whether the particles fit into their numbers and into the memory [bytes], if that is known.
-fn capacity(geometry: &Geometry, memory: Option<f64>) -> Result<()> {
+fn capacity(geometry: &Geometry, neighbours: Neighbours, memory: Option<f64>) -> Result<()> {
     // In f64, as a tiny spacing overflows any integer.
     let counts = geometry.boxes().into_iter().map(|(name, b)| {
         let h = b.spacing.per_axis();
         let count: f64 = (0..3)
             .map(|a| ((b.max[a] - b.min[a]) / h[a]).round().max(1.0) + 1.0)
             .product();
-        (count, name)
+        let pairs = match neighbours {
+            Neighbours::Lattice(_) => 0.0,
+            Neighbours::Radius { radius } => {
+                // Cells of a ball around a particle, as far as the box reaches.
+                let reach = (radius + 1.0) * h.into_iter().fold(0.0, f64::max);
+                let ball = 4.19 * reach.powi(3) / (h[0] * h[1] * h[2]);
+                count * ball.min(count)
+            }
+        };
+        (count, pairs, name)
     });
-    let (mut total, mut most) = (0.0, (0.0, None));
-    for (count, name) in counts {
+    let (mut total, mut bytes, mut most) = (0.0, 0.0, (0.0, None));
+    for (count, pairs, name) in counts {
         total += count;
+        bytes += count * BYTES_PER_PARTICLE + pairs * BYTES_PER_PAIR;
         if count > most.0 {
             most = (count, name);
         }
@@ -464,9 +476,10 @@ fn capacity(geometry: &Geometry, memory: Option<f64>) -> Result<()> {
         Err(Error::new(
             Code::OutOfMemory,
             format!(
-                "this spacing makes about {} particles, which need about {} GB; {limit}; choose a larger spacing",
+                "this spacing makes about {} particles, which with their neighbours need about {} GB; \
+                 {limit}; choose a larger spacing or fewer neighbours",
                 amount(total, 1.0, 0),
-                amount(total * BYTES_PER_PARTICLE, 1e9, 1)
+                amount(bytes, 1e9, 1)
             ),
         )
         .at_path(format!("{place}.spacing")))
@@ -475,8 +488,8 @@ fn capacity(geometry: &Geometry, memory: Option<f64>) -> Result<()> {
         return error(format!("at most {MAX_PARTICLES} particles are possible"));
     }
     match memory {
-        Some(bytes) if total * BYTES_PER_PARTICLE > bytes => {
-            error(format!("{} GB are available", amount(bytes, 1e9, 1)))
+        Some(memory) if bytes > memory => {
+            error(format!("{} GB are available", amount(memory, 1e9, 1)))
         }
         _ => Ok(()),
     }
@@ -502,9 +515,11 @@ mod tests {
             spacing: Spacing::Uniform(0.1),
         });
         let need = 1331.0 * BYTES_PER_PARTICLE;
-        capacity(&geometry, None).unwrap();
-        capacity(&geometry, Some(need)).unwrap();
-        let error = capacity(&geometry, Some(need - 1.0)).unwrap_err();
+        capacity(&geometry, Neighbours::Lattice(18), None).unwrap();
+        capacity(&geometry, Neighbours::Lattice(18), Some(need)).unwrap();
+        let error = capacity(&geometry, Neighbours::Lattice(18), Some(need - 1.0)).unwrap_err();
+        let wide = Neighbours::Radius { radius: 1e9 };
+        capacity(&geometry, wide, Some(need)).unwrap_err();
         assert_eq!(error.code(), Code::OutOfMemory);
         assert_eq!(error.place().path.as_deref(), Some("geometry.box.spacing"));
         assert!(error.message().contains("1331 particles"), "{error}");
