@@ -58,12 +58,13 @@ pub mod scene;
 mod simulation;
 mod snapshot;
 
+pub use boundary::{Input, Patch, Quantity};
 pub use error::{Code, Error, Result};
 pub use fields::{Configuration, FIELDS, Field, FieldInfo};
 pub use ledger::{Energies, Momenta, Resultant};
 pub use plan::Plan;
 pub use scene::Scene;
-pub use simulation::{Control, Input, Patch, ProbeMotion, Progress, Quantity, Simulation, View};
+pub use simulation::{Control, ProbeMotion, Progress, Simulation, View};
 pub use snapshot::Snapshot;
 
 /// Version of the library, the header and the FMU.

@@ -1,6 +1,6 @@
 //! A running simulation: the time step is written here, once.
 
-use crate::boundary::{Boundary, InputValues};
+use crate::boundary::{Boundary, Input, InputValues, Patch, Quantity};
 use crate::error::{Code, Error, Result};
 use crate::fields::Field;
 use crate::formulation::angular_momentum;
@@ -82,66 +82,6 @@ pub struct Progress {
     pub dt: f64,
     /// Time steps since time 0.
     pub steps: u64,
-}
-
-/// A named patch of boundary particles.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Patch {
-    /// Name, as in the scene's `boundary` and `patches`.
-    pub name: String,
-    /// Particles, 0-based in the caller's order, ascending.
-    pub particles: Vec<usize>,
-    /// Tributary areas in the initial configuration [m^2], one per particle.
-    pub areas: Vec<f64>,
-    /// Unit outward normals in the initial configuration, one per particle.
-    pub normals: Vec<[f64; 3]>,
-}
-
-/// What can be set from outside on a patch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Quantity {
-    /// Dead traction [Pa], 3 components.
-    Traction,
-    /// Follower pressure [Pa], 1 component.
-    Pressure,
-    /// Prescribed velocity [m/s], 3 components.
-    Velocity,
-}
-
-impl Quantity {
-    /// Name: `traction`, `pressure`, `velocity`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Quantity::Traction => "traction",
-            Quantity::Pressure => "pressure",
-            Quantity::Velocity => "velocity",
-        }
-    }
-    /// Components per value.
-    pub fn components(self) -> usize {
-        if self == Quantity::Pressure { 1 } else { 3 }
-    }
-    /// SI unit.
-    pub fn unit(self) -> &'static str {
-        if self == Quantity::Velocity {
-            "m/s"
-        } else {
-            "Pa"
-        }
-    }
-}
-
-/// An input that the scene declares as `external`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Input {
-    /// Index of the patch in [`Simulation::patches`].
-    pub patch: usize,
-    /// What is set.
-    pub quantity: Quantity,
-    /// Whether the scene declares one value per particle (`per_particle`).
-    pub per_particle: bool,
-    /// Start value from the scene, `quantity.components()` long.
-    pub start: Vec<f64>,
 }
 
 /// Motion of a probe.

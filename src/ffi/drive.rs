@@ -4,8 +4,9 @@ use super::args::{array, buffer, check, put};
 use super::handle::{Session, with};
 use super::query::{patch_at, quantity_at};
 use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
+use crate::boundary::Quantity;
 use crate::error::{Error, Result};
-use crate::simulation::{Control, Quantity};
+use crate::simulation::Control;
 
 /// Sets the traction on a patch, per unit initial area, whose condition the scene declares as
 /// `external`. It holds from now on, until it is set again.

@@ -9,9 +9,10 @@ use super::types::{
     urlsph_momenta, urlsph_patch_info, urlsph_probe_info, urlsph_probe_motion, urlsph_quantity,
     urlsph_resultant, urlsph_simulation, urlsph_status, urlsph_view,
 };
+use crate::boundary::{Patch, Quantity};
 use crate::error::{Error, Result};
 use crate::fields::{Configuration, FIELDS, FieldInfo};
-use crate::simulation::{Patch, Quantity, Simulation};
+use crate::simulation::Simulation;
 
 // Indices and names.
 

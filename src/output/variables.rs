@@ -6,11 +6,12 @@
 
 use std::borrow::Cow;
 
+use crate::boundary::Patch;
 use crate::error::{Error, Result};
 use crate::fields::{Field, FieldInfo};
 use crate::ledger::{Energies, Momenta, Resultant};
 use crate::scene::Scene;
-use crate::simulation::{Patch, ProbeMotion, Simulation};
+use crate::simulation::{ProbeMotion, Simulation};
 
 /// Fields that are written when the scene names none.
 pub const DEFAULT_FIELDS: [Field; 5] = [
