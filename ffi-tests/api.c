@@ -629,7 +629,7 @@ static void resultants(void) {
 }
 
 static void snapshots(void) {
-    urlsph_simulation *s = create(NULL, 2), *other = create("title=\"Another\"", 1);
+    urlsph_simulation *s = create(NULL, 2), *other = create("material.neo_hookean.poisson_ratio=0.21", 1);
     CHECK(s && other);
     const double pull[3] = {1e4, 0.0, 0.0}, push[3] = {-5e4, 0.0, 0.0};
     const size_t top = patch(s, "top");
