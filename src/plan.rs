@@ -60,28 +60,22 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
             _ => "independent j".to_string(),
         },
     );
-    feature(
-        n.volume_dissipation > 0.0,
-        format!(
-            "volume dissipation D^j (coefficient {})",
-            n.volume_dissipation
-        ),
-    );
-    feature(
-        n.reference_update != ReferenceUpdate::Never,
-        match n.reference_update {
-            ReferenceUpdate::Every(steps) => {
-                format!(
-                    "reference update every {steps} steps, kernel option {}",
-                    n.kernel_option
-                )
-            }
-            _ => format!(
-                "reference update every step, kernel option {}",
-                n.kernel_option
-            ),
-        },
-    );
+    let volume_dissipation = match n.volume_dissipation {
+        0.0 => "volume dissipation D^j".to_string(),
+        coefficient => format!("volume dissipation D^j (coefficient {coefficient})"),
+    };
+    feature(n.volume_dissipation > 0.0, volume_dissipation);
+    let option = n.kernel_option;
+    let update = match n.reference_update {
+        ReferenceUpdate::Never => "reference update".to_string(),
+        ReferenceUpdate::EveryStep => {
+            format!("reference update every step, kernel option {option}")
+        }
+        ReferenceUpdate::Every(steps) => {
+            format!("reference update every {steps} steps, kernel option {option}")
+        }
+    };
+    feature(n.reference_update != ReferenceUpdate::Never, update);
     feature(
         n.angular_momentum_projection,
         "angular-momentum projection".to_string(),
