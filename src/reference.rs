@@ -166,6 +166,17 @@ impl PairVectors for Stored<'_> {
     }
 }
 
+/// Runs an expression with the reference's pair vectors bound to a name.
+macro_rules! with_pairs {
+    ($reference:expr, $name:ident => $body:expr) => {
+        match $reference.pair_vectors() {
+            $crate::reference::Pairs::Lean($name) => $body,
+            $crate::reference::Pairs::Stored($name) => $body,
+        }
+    };
+}
+pub(crate) use with_pairs;
+
 #[derive(Debug)]
 struct StoredVectors {
     ab: [Vec<Slots>; 3],
@@ -427,24 +438,10 @@ impl Reference {
         let f_chi = updated
             .filter(|_| this.option < 4)
             .map(|u| u.f_chi.components());
-        let bad = parallel::map_slabs(l.slabs_mut(), |slab, out| match this.pair_vectors() {
-            Pairs::Lean(pairs) => vectorised(Correct {
-                pairs,
-                this,
-                points,
-                f_chi,
-                slab,
-                out,
-            }),
-            Pairs::Stored(pairs) => vectorised(Correct {
-                pairs,
-                this,
-                points,
-                f_chi,
-                slab,
-                out,
-            }),
-        });
+        let bad = parallel::map_slabs(
+            l.slabs_mut(),
+            |slab, out| with_pairs!(this, pairs => vectorised(Correct { pairs, this, points, f_chi, slab, out })),
+        );
         self.l = l;
         bad.into_iter().flatten().next()
     }

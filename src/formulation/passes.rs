@@ -2,7 +2,7 @@
 
 use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
-use super::url::{Breakdown, Scratch, State, is_admissible};
+use super::url::{Breakdown, Scratch, State};
 use crate::lane::{Lane, PerSlot, SLICE, Work};
 use crate::layout::Array;
 use crate::material::{Deformation, Material};
@@ -222,6 +222,7 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
                 &kinematics,
                 reference,
                 &v,
+                law.density(),
                 slab,
             ));
         }
@@ -235,19 +236,37 @@ fn first_breakdown<const STATE: u8, const UPDATED: bool>(
     kinematics: &Kinematics,
     reference: &Reference,
     v: &[&[f64]; 3],
+    density: f64,
     slab: usize,
 ) -> Breakdown {
-    for (_, slot) in lanes_of::<f64>(reference, slab) {
-        let total = kinematics.total::<f64, STATE, UPDATED>((), slot);
-        let det = dot(total.f[0], cofactor(&total.f)[0]);
-        let velocity = load3::<f64>((), v, slot);
-        for jacobian in [total.j, det, 1.0 + 0.0 * dot(velocity, velocity)] {
-            if !is_admissible(jacobian) {
-                return Breakdown { slot, jacobian };
-            }
-        }
-    }
-    unreachable!("called for a slab with one")
+    let volume = reference.volume.components()[0];
+    let (first, _) = reference.layout.slab_range(slab);
+    lanes_of::<f64>(reference, slab)
+        .find_map(|(_, slot)| {
+            let total = kinematics.total::<f64, STATE, UPDATED>((), slot);
+            inadmissible(&total, load3((), v, slot), density * volume[slot], slot)
+        })
+        .unwrap_or(Breakdown {
+            slot: first,
+            jacobian: f64::NAN,
+        })
+}
+
+/// What breaks a particle down: a volume ratio, j's or that of F, that is not positive and finite, or
+/// a kinetic energy that is not finite, reported as a ratio that is NaN.
+pub(super) fn inadmissible(
+    total: &Deformation<f64>,
+    v: Vec3<f64>,
+    mass: f64,
+    slot: usize,
+) -> Option<Breakdown> {
+    let det = dot(total.f[0], cofactor(&total.f)[0]);
+    let motion = 0.5 * mass * dot(v, v);
+    let bad = |ratio: &f64| !(*ratio > 0.0 && *ratio < f64::INFINITY);
+    [total.j, det, 1.0 + 0.0 * motion]
+        .into_iter()
+        .find(bad)
+        .map(|jacobian| Breakdown { slot, jacobian })
 }
 
 /// Scales the gradients for the reconstruction by Venkatakrishnan's limiter.

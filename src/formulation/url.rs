@@ -11,7 +11,7 @@
 
 use super::passes::{
     Advance, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, PointOutput, Points,
-    StateSlab, VolumeRates,
+    StateSlab, VolumeRates, inadmissible,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
@@ -19,7 +19,7 @@ use crate::layout::{Array, Layout};
 use crate::material::{Deformation, Law, Material, with_law};
 use crate::math::*;
 use crate::parallel;
-use crate::reference::{Pairs, Reference, store9};
+use crate::reference::{Reference, load3, store9, with_pairs};
 use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
 
 /// The evolving fields: with the time, what the integrator advances and a snapshot copies.
@@ -343,10 +343,7 @@ impl Url {
                     }
                 };
             }
-            match reference.pair_vectors() {
-                Pairs::Lean(pairs) => forces!(pairs, CONSTANT, LINEAR, MINMOD, OFF),
-                Pairs::Stored(pairs) => forces!(pairs, CONSTANT, LINEAR, MINMOD, OFF),
-            }
+            with_pairs!(reference, pairs => forces!(pairs, CONSTANT, LINEAR, MINMOD, OFF))
         })
     }
 
@@ -368,58 +365,18 @@ impl Url {
         let kinematics = Kinematics::new(state, reference);
         if options.linear {
             parallel::map_slabs(half_slope.slabs_mut(), |slab, out| {
-                match reference.pair_vectors() {
-                    Pairs::Lean(pairs) => {
-                        R::run(HalfSlope {
-                            pairs,
-                            reference,
-                            kinematics,
-                            sigma,
-                            slab,
-                            out,
-                        });
-                    }
-                    Pairs::Stored(pairs) => {
-                        R::run(HalfSlope {
-                            pairs,
-                            reference,
-                            kinematics,
-                            sigma,
-                            slab,
-                            out,
-                        });
-                    }
-                }
+                with_pairs!(reference, pairs => R::run(HalfSlope {
+                    pairs, reference, kinematics, sigma, slab, out,
+                }));
             });
         }
         let input = ForceInput::new(state, reference, scratch);
         let (slope, j_chi) = (half_slope.components(), kinematics.j_chi);
         let coefficient = options.volume_dissipation;
         let powers = parallel::map_slabs(out.slabs_mut(), |slab, [out]| {
-            match reference.pair_vectors() {
-                Pairs::Lean(pairs) => R::run(VolumeRates {
-                    pairs,
-                    input,
-                    sigma,
-                    slope,
-                    j_chi,
-                    pressure_speed,
-                    coefficient,
-                    slab,
-                    out,
-                }),
-                Pairs::Stored(pairs) => R::run(VolumeRates {
-                    pairs,
-                    input,
-                    sigma,
-                    slope,
-                    j_chi,
-                    pressure_speed,
-                    coefficient,
-                    slab,
-                    out,
-                }),
-            }
+            with_pairs!(reference, pairs => R::run(VolumeRates {
+                pairs, input, sigma, slope, j_chi, pressure_speed, coefficient, slab, out,
+            }))
         });
         scratch.sigma_j = Some((sigma_j, half_slope));
         powers.iter().sum()
@@ -491,6 +448,8 @@ impl Url {
         let layout = reference.layout;
         let mut new = old.clone();
         let kinematics = Kinematics::new(state, reference);
+        let (velocity, density) = (state.v.components(), self.law.density());
+        let volume = reference.volume.components()[0];
         let mut h_chi = new.h_chi.as_mut().map(|h| h.slabs_mut().into_iter());
         let slabs: Vec<_> = new
             .f_chi
@@ -510,15 +469,10 @@ impl Url {
                     store9(&total.h, h_chi, at);
                 }
                 // Whatever an evaluation would refuse must not get into the reference.
-                let det = dot(total.f[0], cofactor(&total.f)[0]);
-                for jacobian in [total.j, det] {
-                    if breakdown.is_none() && !is_admissible(jacobian) {
-                        breakdown = Some(Breakdown {
-                            slot: first + at,
-                            jacobian,
-                        });
-                    }
-                }
+                let slot = first + at;
+                let mass = density * volume[slot];
+                breakdown = breakdown
+                    .or_else(|| inadmissible(&total, load3((), &velocity, slot), mass, slot));
             }
             breakdown
         });
@@ -557,11 +511,6 @@ impl Url {
     }
 }
 
-/// Whether a volume ratio is positive and finite.
-pub(super) fn is_admissible(jacobian: f64) -> bool {
-    jacobian > 0.0 && jacobian < f64::INFINITY
-}
-
 /// Gradient of a vector field with respect to the reference, for one slab.
 fn gradient<'a, R: Runner>(
     reference: &'a Reference,
@@ -569,22 +518,9 @@ fn gradient<'a, R: Runner>(
     slab: usize,
     out: &mut [&'a mut [f64]; 9],
 ) {
-    match reference.pair_vectors() {
-        Pairs::Lean(pairs) => R::run(Gradient {
-            pairs,
-            reference,
-            field,
-            slab,
-            out,
-        }),
-        Pairs::Stored(pairs) => R::run(Gradient {
-            pairs,
-            reference,
-            field,
-            slab,
-            out,
-        }),
-    }
+    with_pairs!(reference, pairs => R::run(Gradient {
+        pairs, reference, field, slab, out,
+    }));
 }
 
 /// How the passes run: on vectors, or in the tests one particle at a time as the readable form.
