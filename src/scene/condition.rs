@@ -1,0 +1,118 @@
+//! Initial and boundary conditions: the schema, and what they must satisfy.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::validate::require;
+use super::value::{Scalar, Vector, VectorFunction, below};
+use crate::error::{Error, Result};
+
+/// Conditions on one patch: at most one support, and any loads.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Condition {
+    /// Homogeneous support.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub support: Option<Support>,
+    /// Prescribed velocity [m/s]; a component that is `null` stays free.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Vector>,
+    /// Dead traction per unit initial area [Pa].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traction: Option<Vector>,
+    /// Follower pressure per unit current area, positive in compression [Pa].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<Scalar>,
+}
+
+/// Homogeneous supports, by the normal of the patch in the initial configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Support {
+    /// No motion.
+    Clamped,
+    /// Tangential motion only (symmetry).
+    Roller,
+    /// Normal motion only.
+    Antisymmetry,
+}
+
+/// Initial state, by components in X, Y, Z [m] of the initial configuration.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Initial {
+    /// Velocity [m/s].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Vector>,
+    /// Displacement [m]; the deformation gradient follows from it by the discrete gradient.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displacement: Option<Vector>,
+}
+
+pub(super) fn validate(path: &str, condition: &Condition) -> Result<()> {
+    require(
+        condition.support.is_none() || condition.velocity.is_none(),
+        path,
+        "a patch has either a `support` or a prescribed `velocity`, not both",
+    )?;
+    if let Some(velocity) = &condition.velocity {
+        compiled(&format!("{path}.velocity"), velocity)?;
+    }
+    if let Some(traction) = &condition.traction {
+        load(&format!("{path}.traction"), traction)?;
+    }
+    if let Some(pressure) = &condition.pressure {
+        let place = format!("{path}.pressure");
+        pressure.compile().map_err(|e| below(&place, e))?;
+    }
+    Ok(())
+}
+
+pub(super) fn initial(initial: &Initial) -> Result<()> {
+    for (name, field) in [
+        ("velocity", &initial.velocity),
+        ("displacement", &initial.displacement),
+    ] {
+        let Some(vector) = field else { continue };
+        let path = format!("initial.{name}");
+        let in_space =
+            "an initial value has three components, each a number or an expression in X, Y and Z";
+        let Vector::Components(components) = vector else {
+            return Err(Error::scene(path, in_space));
+        };
+        let function = load(&path, vector)?;
+        for (c, component) in components.iter().enumerate() {
+            require(
+                matches!(component, Some(Scalar::Constant(_) | Scalar::Expression(_))),
+                &format!("{path}[{c}]"),
+                in_space,
+            )?;
+        }
+        if let VectorFunction::Components(functions) = &function {
+            for (c, component) in functions.iter().flatten().enumerate() {
+                require(
+                    !component.depends_on_time(),
+                    &format!("{path}[{c}]"),
+                    "an initial value cannot depend on t",
+                )?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn compiled(path: &str, vector: &Vector) -> Result<VectorFunction> {
+    vector.compile().map_err(|e| below(path, e))
+}
+
+/// A vector without free components.
+pub(super) fn load(path: &str, vector: &Vector) -> Result<VectorFunction> {
+    let function = compiled(path, vector)?;
+    match function.free().iter().position(|free| *free) {
+        None => Ok(function),
+        Some(c) => Err(Error::scene(
+            format!("{path}[{c}]"),
+            "`null` (a free component) is only for the prescribed velocity of a boundary; write 0",
+        )),
+    }
+}

@@ -1,0 +1,248 @@
+//! Discretisation and time integration: the schema, and what it must satisfy.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::de::value::MapAccessDeserializer;
+use serde::{Deserialize, Deserializer, Serialize, de};
+
+use super::validate::{positive, require};
+use crate::error::Result;
+
+/// Discretisation and time integration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Numerics {
+    /// Neighbours of a particle.
+    pub neighbours: Neighbours,
+    /// Weights inside the kernel gradient.
+    pub weights: Weights,
+    /// Smoothing factor f_h: h_b = f_h x largest distance to a neighbour ([URL22] 37).
+    pub smoothing_factor: f64,
+    /// How kernels follow an updated reference ([URL22] 49-52), 1 to 4.
+    #[schemars(range(min = 1, max = 4))]
+    pub kernel_option: u8,
+    /// When the reference configuration is updated.
+    pub reference_update: ReferenceUpdate,
+    /// Which incremental deformation measures are independent unknowns.
+    pub state: StateMeasures,
+    /// Reconstruction of the velocity at the middle of a pair.
+    pub reconstruction: Reconstruction,
+    /// Limiter of the linear reconstruction.
+    pub limiter: Limiter,
+    /// Riemann dissipation of the momentum equation, D^p; `false` leaves it out.
+    pub dissipation: bool,
+    /// Coefficient of the dissipation D^j of the volume equation; needs `j` among the unknowns. 0 leaves it out.
+    pub volume_dissipation: f64,
+    /// Projection of the internal forces that conserves angular momentum ([URL22] section 6).
+    pub angular_momentum_projection: bool,
+    /// CFL number; default 0.6 with 6 neighbours, otherwise 0.9.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cfl: Option<f64>,
+    /// Fixed time step [s] instead of the CFL condition.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_step: Option<f64>,
+}
+
+impl Default for Numerics {
+    fn default() -> Self {
+        Self {
+            neighbours: Neighbours::Lattice(18),
+            weights: Weights::Unit,
+            smoothing_factor: 0.6,
+            kernel_option: 1,
+            reference_update: ReferenceUpdate::Never,
+            state: StateMeasures::F,
+            reconstruction: Reconstruction::Linear,
+            limiter: Limiter::None,
+            dissipation: true,
+            volume_dissipation: 0.0,
+            angular_momentum_projection: false,
+            cfl: None,
+            time_step: None,
+        }
+    }
+}
+
+impl Numerics {
+    /// The CFL number: the scene's, or the one that is proven stable for the largest number of
+    /// neighbours of a particle.
+    pub fn cfl_number(&self, neighbours: usize) -> f64 {
+        self.cfl.unwrap_or(if neighbours <= 6 { 0.6 } else { 0.9 })
+    }
+}
+
+/// 6, 18 or 26 lattice neighbours, or `{"radius": r}`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields)]
+pub enum Neighbours {
+    /// 6, 18 or 26 neighbours that share a lattice cell.
+    Lattice(#[schemars(extend("enum" = [6, 18, 26]))] u8),
+    /// All particles within a radius, in multiples of the largest lattice spacing.
+    Radius {
+        /// Radius over spacing.
+        radius: f64,
+    },
+}
+
+/// Weights inside the kernel gradient.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Weights {
+    /// Every neighbour weighs the same: uniform stress gives no force inside the body.
+    Unit,
+    /// Tributary volumes, as printed in [URL22] 42.
+    Tributary,
+}
+
+/// When the reference configuration is updated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ReferenceUpdate {
+    /// Never: total Lagrangian.
+    Never,
+    /// After every step: updated Lagrangian.
+    EveryStep,
+    /// After every n steps.
+    Every(#[schemars(range(min = 1))] u32),
+}
+
+/// Which incremental deformation measures are independent unknowns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StateMeasures {
+    /// f; h = cof f and j = det f.
+    F,
+    /// f and j; h = cof f.
+    Fj,
+    /// f, h and j.
+    Fhj,
+}
+
+/// Reconstruction of the velocity at the middle of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Reconstruction {
+    /// Piecewise constant: first order.
+    None,
+    /// Linear, with the corrected gradient: second order.
+    Linear,
+}
+
+/// Limiter of the linear reconstruction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Limiter {
+    /// No limiter.
+    None,
+    /// Venkatakrishnan.
+    Venkatakrishnan,
+    /// Edge-wise minmod.
+    Minmod,
+}
+
+impl<'de> Deserialize<'de> for Neighbours {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Radius {
+            radius: f64,
+        }
+        struct Visitor;
+        impl<'de> de::Visitor<'de> for Visitor {
+            type Value = Neighbours;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(r#"6, 18, 26 or {"radius": r}"#)
+            }
+            fn visit_u64<E: de::Error>(self, v: u64) -> std::result::Result<Neighbours, E> {
+                u8::try_from(v)
+                    .map(Neighbours::Lattice)
+                    .map_err(|_| E::invalid_value(de::Unexpected::Unsigned(v), &self))
+            }
+            fn visit_map<A: de::MapAccess<'de>>(
+                self,
+                map: A,
+            ) -> std::result::Result<Neighbours, A::Error> {
+                let Radius { radius } = Radius::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(Neighbours::Radius { radius })
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+pub(super) fn validate(n: &Numerics) -> Result<()> {
+    match n.neighbours {
+        Neighbours::Lattice(count) => require(
+            [6, 18, 26].contains(&count),
+            "numerics.neighbours",
+            &format!("expected 6, 18, 26 or {{\"radius\": r}} instead of {count}"),
+        )?,
+        Neighbours::Radius { radius } => require(
+            radius.is_finite() && radius > 1.0,
+            "numerics.neighbours.radius",
+            &format!(
+                "expected a finite radius above 1 (in multiples of the spacing) instead of {radius}"
+            ),
+        )?,
+    }
+    require(
+        n.smoothing_factor > 0.5 && n.smoothing_factor <= 2.0,
+        "numerics.smoothing_factor",
+        &format!(
+            "expected more than 0.5 (or the kernel does not reach its neighbours) and at most 2 instead of {}",
+            n.smoothing_factor
+        ),
+    )?;
+    require(
+        (1..=4).contains(&n.kernel_option),
+        "numerics.kernel_option",
+        &format!("expected 1, 2, 3 or 4 instead of {}", n.kernel_option),
+    )?;
+    require(
+        n.reference_update != ReferenceUpdate::Every(0),
+        "numerics.reference_update.every",
+        "expected at least 1 step between updates instead of 0; `never` is total Lagrangian",
+    )?;
+    require(
+        n.volume_dissipation.is_finite() && n.volume_dissipation >= 0.0,
+        "numerics.volume_dissipation",
+        &format!(
+            "expected a finite number, 0 or more, instead of {}",
+            n.volume_dissipation
+        ),
+    )?;
+    require(
+        n.volume_dissipation == 0.0 || n.state != StateMeasures::F,
+        "numerics.volume_dissipation",
+        "it acts on the volume equation, which needs `state` to be `fj` or `fhj`",
+    )?;
+    if n.limiter != Limiter::None {
+        require(
+            n.reconstruction == Reconstruction::Linear,
+            "numerics.limiter",
+            "a limiter needs `reconstruction` to be `linear`",
+        )?;
+        require(
+            n.dissipation,
+            "numerics.limiter",
+            "a limiter acts on the dissipation, which is switched off; set `limiter` to `none` or `dissipation` to true",
+        )?;
+    }
+    if let Some(cfl) = n.cfl {
+        require(
+            cfl > 0.0 && cfl <= 2.0,
+            "numerics.cfl",
+            &format!("expected more than 0 and at most 2 instead of {cfl}"),
+        )?;
+    }
+    if let Some(step) = n.time_step {
+        positive("numerics.time_step", step)?;
+        require(
+            n.cfl.is_none(),
+            "numerics.time_step",
+            "a fixed step replaces the CFL condition; give `time_step` or `cfl`, not both",
+        )?;
+    }
+    Ok(())
+}
