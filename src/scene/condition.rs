@@ -46,7 +46,7 @@ pub struct Convection {
 
 impl Condition {
     /// The first condition for heat, by its key.
-    fn heat(&self) -> Option<&'static str> {
+    pub(super) fn heat(&self) -> Option<&'static str> {
         (self.heat_flux.as_ref().map(|_| "heat_flux"))
             .or(self.convection.as_ref().map(|_| "convection"))
             .or(self.temperature.as_ref().map(|_| "temperature"))
