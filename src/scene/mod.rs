@@ -22,7 +22,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use condition::{Condition, Initial, Support};
+pub use condition::{Condition, Convection, Initial, Support};
 pub use expression::Expression;
 pub use geometry::{BoxGeometry, Geometry, PatchSelection, Spacing};
 pub use heat::Heat;
