@@ -12,7 +12,7 @@
 use super::conduction::Conduction;
 use super::passes::{
     Advance, Flow, ForceInput, Forces, Gradient, HalfSlope, Heating, Kinematics, LawInputs, Laws,
-    Limit, Plastic, PointOutput, Points, StateSlab, Stored, VolumeRates, immovable, inadmissible,
+    Limit, PointOutput, Points, StateSlab, Stored, VolumeRates, immovable, inadmissible,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
@@ -22,6 +22,8 @@ use crate::math::*;
 use crate::parallel;
 use crate::reference::{Reference, load3, store9, with_pairs};
 use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
+
+pub use super::passes::Plastic;
 
 /// The evolving fields: with the time, what the integrator advances and a snapshot copies.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,7 +119,6 @@ pub enum Trouble {
 /// What the scene asks of the formulation, resolved to what the loops branch on.
 #[derive(Debug, Clone, Copy)]
 struct Options {
-    state: StateMeasures,
     mode: u8,
     venkatakrishnan: bool,
     volume_dissipation: f64,
@@ -203,7 +204,6 @@ impl Url {
         Self {
             law,
             options: Options {
-                state: numerics.state,
                 mode,
                 venkatakrishnan: numerics.limiter == Limiter::Venkatakrishnan,
                 volume_dissipation: numerics.volume_dissipation,
@@ -231,7 +231,8 @@ impl Url {
 
     /// Wave speeds of the linearised law [m/s]: adiabatic with heat.
     pub fn wave_speeds(&self) -> WaveSpeeds<f64> {
-        let heat = self.options.thermal.map_or(0.0, |t| t.stiffness());
+        let thermal = self.options.thermal;
+        let heat = thermal.map_or(0.0, |t| t.adiabatic_stiffness() + t.softening());
         with_law!(self.law, law => WaveSpeeds {
             pressure: (law.pressure_wave_speed().powi(2) + heat / law.density()).sqrt(),
             shear: law.shear_wave_speed(),
@@ -273,18 +274,64 @@ impl Url {
             .map_or(f64::NAN, |(thermal, eta)| thermal.warmth(&d, eta).theta)
     }
 
-    /// Sets the temperature [K] of the particle in a slot at its present deformation.
+    /// Temperature that the last evaluation found in a slot [K].
+    pub fn evaluated_temperature(&self, slot: usize) -> f64 {
+        let theta = self.scratch.theta.as_ref();
+        theta.map_or(f64::NAN, |theta| theta.get(slot)[0])
+    }
+
+    /// Heat that the particle in a slot takes up [W] at the evaluated rates while its temperature
+    /// changes at a rate [K/s]: theta d eta/dt.
+    pub fn heat_uptake(&self, state: &State, reference: &Reference, slot: usize, rate: f64) -> f64 {
+        let Some(thermal) = self.options.thermal else {
+            return 0.0;
+        };
+        let d = self.deformation(state, reference, slot);
+        let f = matrix(&state.f.get(slot));
+        let cof = cofactor(&f);
+        // Rate of ln J.
+        let dilation = double_dot(&matrix(&self.rates.grad_v.get(slot)), &cof) / dot(f[0], cof[0]);
+        let theta = self.evaluated_temperature(slot);
+        reference.volume.get(slot)[0] * thermal.uptake(&d, theta, rate, dilation)
+    }
+
+    /// Heat rate that a ledger counts [W]: what comes from outside. The linear law's entropy takes
+    /// heat up at the reference temperature, so that its energy changes by theta/theta_R of the heat
+    /// everywhere, conduction included.
+    pub fn heat_power(&self, external: f64) -> f64 {
+        match (&self.rates.heat, self.options.thermal) {
+            (Some(heat), Some(thermal)) if thermal.linear => {
+                let slots = (0..heat.particles()).map(Layout::slot);
+                slots
+                    .map(|s| heat.get(s)[0] * self.evaluated_temperature(s) / thermal.theta_r)
+                    .sum()
+            }
+            _ => external,
+        }
+    }
+
+    /// Sets the temperature [K] of the particle in a slot at its present deformation; the heat that
+    /// this takes [J].
     pub fn set_temperature(
         &self,
         state: &mut State,
         reference: &Reference,
         slot: usize,
         theta: f64,
-    ) {
+    ) -> f64 {
         let d = self.deformation(state, reference, slot);
-        if let (Some(eta), Some(thermal)) = (&mut state.eta, self.options.thermal) {
-            eta.set(slot, [thermal.entropy(&d, theta)]);
-        }
+        let (Some(eta), Some(thermal)) = (&mut state.eta, self.options.thermal) else {
+            return 0.0;
+        };
+        let before = thermal.warmth(&d, eta.get(slot)[0]).energy;
+        eta.set(slot, [thermal.entropy(&d, theta)]);
+        let after = thermal.warmth(&d, eta.get(slot)[0]).energy;
+        reference.volume.get(slot)[0] * (after - before)
+    }
+
+    /// Constants of a body with heat.
+    pub fn thermal(&self) -> Option<Thermal> {
+        self.options.thermal
     }
 
     /// Rates of a state. Of a law with a history, the state of a stage is `elapsed` [s] after the
@@ -607,7 +654,7 @@ impl Url {
             let (first, slices) = layout.slab_range(slab);
             let mut breakdown = None;
             for at in 0..slices * SLICE {
-                let total = kinematics.total((), first + at);
+                let total = kinematics.total::<f64>((), first + at);
                 store9(&total.f, &mut f_chi, at);
                 total.j.store(j_chi, at);
                 if let Some(h_chi) = &mut h_chi {
@@ -674,12 +721,12 @@ fn flow<M: Material>(work: Flow<M>) -> Plastic {
 }
 
 /// The law pass of one slab, compiled for what the body has; with `flow` a history is mapped.
-fn stresses<R: Runner, M: Material>(
+fn stresses<'a, R: Runner, M: Material>(
     law: M,
-    inputs: LawInputs,
+    inputs: LawInputs<'a>,
     flow: bool,
     slab: usize,
-    out: &mut PointOutput,
+    out: &mut PointOutput<'a>,
 ) -> std::result::Result<Stored, Breakdown> {
     macro_rules! laws {
         ($heat:literal, $flow:literal) => {
@@ -741,11 +788,7 @@ pub fn deform(state: &mut State, reference: &Reference) {
     });
     for slot in (0..layout.particles).map(Layout::slot) {
         let own = f.get(slot);
-        let m = [
-            [own[0], own[1], own[2]],
-            [own[3], own[4], own[5]],
-            [own[6], own[7], own[8]],
-        ];
+        let m = matrix(&own);
         let cof = cofactor(&m);
         state.f.set(slot, own);
         if let Some(h) = &mut state.h {
@@ -803,9 +846,10 @@ mod tests {
         let particles = Particles::new(&scene).expect("particles");
         let graph = Graph::new(&particles, scene.numerics.neighbours).expect("graph");
         let mut reference = Reference::new(&particles, &graph, &scene.numerics).expect("operators");
+        let (law, thermal) = Law::of(&scene);
+        let url = Url::new(&reference, law, thermal, &scene.numerics);
         let mut state =
-            crate::simulation::initial_state(&scene, &reference, &particles).expect("state");
-        let url = Url::new(&reference, Law::new(&scene.material), &scene.numerics);
+            crate::simulation::initial_state(&scene, &url, &reference, &particles).expect("state");
         url.update_reference(&mut state, &mut reference)
             .expect("a good deformation");
         (reference, state, url)
@@ -847,6 +891,11 @@ mod tests {
                 "numerics.reference_update=every_step",
             ],
             &[
+                "heat={\"specific_heat\": 1, \"reference_temperature\": 293, \"conductivity\": 10, \"gruneisen_coefficient\": 0.5, \"gruneisen_exponent\": 0.5}",
+                "initial.temperature=293 + 5*X - sin(Y)",
+                "numerics.reference_update=every_step",
+            ],
+            &[
                 "material={\"mooney_rivlin\": {\"density\": 1, \"youngs_modulus\": 3, \"poisson_ratio\": 0.2}}",
             ],
         ];
@@ -854,11 +903,11 @@ mod tests {
         for overrides in options {
             let (reference, state, mut url) = body(overrides);
             let wide = pool
-                .install(|| url.evaluate(&state, &reference))
+                .install(|| url.evaluate(&state, &reference, None))
                 .expect("a good state");
             let rates = |url: &Url| {
-                let j = url.rates.j_dissipation.clone();
-                (url.rates.force.clone(), url.rates.grad_v.clone(), j)
+                let (j, heat) = (url.rates.j_dissipation.clone(), url.rates.heat.clone());
+                (url.rates.force.clone(), url.rates.grad_v.clone(), j, heat)
             };
             let kept = rates(&url);
             let check = |again: std::result::Result<Evaluation, Breakdown>, url: &Url| {
@@ -871,12 +920,12 @@ mod tests {
                 );
             };
             url.rates.force = Array::new(reference.layout, [0.0; 3]);
-            let single = url.evaluate_on::<OneByOne>(&state, &reference);
+            let single = url.evaluate_on::<OneByOne>(&state, &reference, None);
             check(single, &url);
             #[cfg(target_arch = "x86_64")]
             if pulp::x86::V3::try_new().is_some() {
                 url.rates.force = Array::new(reference.layout, [0.0; 3]);
-                let narrow = url.evaluate_on::<Avx2>(&state, &reference);
+                let narrow = url.evaluate_on::<Avx2>(&state, &reference, None);
                 check(narrow, &url);
             }
         }
@@ -901,14 +950,15 @@ mod tests {
                 state.x.set(slot, mat_vec(&f, x));
             }
             deform(&mut state, &reference);
-            url.evaluate(&state, &reference).expect("a good state");
+            url.evaluate(&state, &reference, None)
+                .expect("a good state");
             let h = cofactor(&f);
             let at = Deformation {
                 f,
                 h,
                 j: dot(f[0], h[0]),
             };
-            let p = url.law().at(&at).first_piola;
+            let p = url.law().at(&at, &VIRGIN, None).first_piola;
             let scale = double_dot(&p, &p).sqrt();
             let (mut inside, mut edges, mut linear): (f64, f64, f64) = (0.0, 0.0, 0.0);
             for slot in slots() {
@@ -932,7 +982,8 @@ mod tests {
                     .v
                     .set(slot, mat_vec(&gradient, reference.x_initial.get(slot)));
             }
-            url.evaluate(&state, &reference).expect("a good state");
+            url.evaluate(&state, &reference, None)
+                .expect("a good state");
             for slot in slots() {
                 for (own, exact) in url.rates.grad_v.get(slot).iter().zip(flat(&gradient)) {
                     linear = linear.max((own - exact).abs());

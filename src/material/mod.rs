@@ -6,7 +6,7 @@ mod thermal;
 
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
-pub use thermal::{Thermal, Warmth};
+pub use thermal::Thermal;
 
 use crate::lane::Lane;
 use crate::math::{Mat3, cofactor, dot, largest_eigenvalue, mat_mul_t, scale9};
@@ -99,6 +99,13 @@ impl Moduli {
             rho,
         }
     }
+    /// The same with a smaller bulk modulus.
+    fn softened(self, by: f64) -> Self {
+        Self {
+            kappa: self.kappa - by,
+            ..self
+        }
+    }
     fn pressure_wave_speed(&self) -> f64 {
         ((self.kappa + 4.0 / 3.0 * self.mu) / self.rho).sqrt()
     }
@@ -128,17 +135,27 @@ macro_rules! with_law {
 pub(crate) use with_law;
 
 impl Law {
-    /// The law of a scene.
-    pub fn new(material: &crate::scene::Material) -> Self {
+    /// The law of a scene's body, and its thermodynamics if it has heat. The moduli of the scene are
+    /// the isothermal ones at rest, so a law leaves out what the thermal pressure adds to them.
+    pub fn of(scene: &crate::scene::Scene) -> (Self, Option<Thermal>) {
+        let law = Self::new(&scene.material, 0.0);
+        match &scene.heat {
+            None => (law, None),
+            Some(heat) => {
+                let softening = Thermal::new(heat, &law).softening();
+                let law = Self::new(&scene.material, softening);
+                (law, Some(Thermal::new(heat, &law)))
+            }
+        }
+    }
+    fn new(material: &crate::scene::Material, softening: f64) -> Self {
         use crate::scene::Material as M;
         match material {
-            M::NeoHookean(m) => Law::NeoHookean(NeoHookean(Moduli::new(
-                m.youngs_modulus,
-                m.poisson_ratio,
-                m.density,
-            ))),
+            M::NeoHookean(m) => Law::NeoHookean(NeoHookean(
+                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density).softened(softening),
+            )),
             M::MooneyRivlin(m) => Law::MooneyRivlin(MooneyRivlin::new(
-                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density),
+                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density).softened(softening),
                 m.area_share,
             )),
         }
@@ -146,6 +163,17 @@ impl Law {
     /// Density rho_R [kg/m^3].
     pub fn density(&self) -> f64 {
         with_law!(*self, law => law.density())
+    }
+    /// Modulus of pressure waves at rest [Pa].
+    pub fn wave_modulus(&self) -> f64 {
+        with_law!(*self, law => law.density() * law.pressure_wave_speed().powi(2))
+    }
+    /// See [`Material::LINEAR`].
+    pub fn is_linear(&self) -> bool {
+        fn of<M: Material>(_: M) -> bool {
+            M::LINEAR
+        }
+        with_law!(*self, law => of(law))
     }
     /// Whether particles carry a history.
     pub fn has_history(&self) -> bool {

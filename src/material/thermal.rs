@@ -1,9 +1,10 @@
 //! Thermodynamics at one point ([URL23] 3.2, 3.3), the same for every law: temperature from entropy
 //! and volume, thermal pressure, thermal energy.
 
-use super::{Deformation, Stress};
+use super::{Deformation, Law, Stress};
 use crate::lane::Lane;
 use crate::math::*;
+use crate::scene::Heat;
 
 /// Constants of a body that has a temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +42,36 @@ pub struct Warmth<T> {
 }
 
 impl Thermal {
-    /// What adiabatic waves add to the wave modulus [Pa]: theta_R Gamma_0^2 c_v.
-    pub fn stiffness(&self) -> f64 {
+    /// The thermodynamics of a scene's body.
+    pub fn new(heat: &Heat, law: &Law) -> Self {
+        let mut this = Self {
+            c_v: law.density() * heat.specific_heat,
+            gamma: heat.gruneisen_coefficient,
+            q: heat.gruneisen_exponent,
+            theta_r: heat.reference_temperature,
+            conductivity: heat.conductivity,
+            plastic_share: heat.plastic_heat_fraction,
+            linear: law.is_linear(),
+            adiabatic_share: 0.0,
+        };
+        let adiabatic = this.adiabatic_stiffness();
+        this.adiabatic_share = adiabatic / (adiabatic + law.wave_modulus() + this.softening());
+        this
+    }
+
+    /// What adiabatic waves add to the isothermal wave modulus at rest [Pa].
+    pub fn adiabatic_stiffness(&self) -> f64 {
         self.theta_r * self.gamma * self.gamma * self.c_v
+    }
+
+    /// What the thermal pressure adds to the isothermal bulk modulus at rest [Pa], so that the law
+    /// itself has so much less ([URL23] 28): c_v theta_R Gamma_0 (1 - q).
+    pub fn softening(&self) -> f64 {
+        if self.linear {
+            0.0
+        } else {
+            self.c_v * self.theta_r * self.gamma * (1.0 - self.q)
+        }
     }
 
     /// J^q and J^(q-1).
@@ -142,6 +170,17 @@ impl Thermal {
             let faster = excess.mul_add(d.j.of(self.adiabatic_share), one);
             stress.stretch = stress.stretch / faster.sqrt();
         }
+    }
+
+    /// Heat per unit initial volume [W/m^3] of a point whose temperature changes at a rate [K/s] and
+    /// ln J at another [1/s]: theta d eta/dt.
+    pub fn uptake(&self, d: &Deformation<f64>, theta: f64, rate: f64, dilation: f64) -> f64 {
+        let coupling = if self.linear {
+            self.theta_r
+        } else {
+            theta * self.powers(d.j).0
+        };
+        self.c_v * (rate + self.gamma * coupling * dilation)
     }
 
     /// The part of a plastic work [J/m^3] that becomes heat.
