@@ -30,6 +30,20 @@ pub struct JohnsonCook {
 }
 
 impl JohnsonCook {
+    /// The yield surface of a scene.
+    pub fn new(m: &crate::scene::JohnsonCook) -> Self {
+        Self {
+            yield_stress: m.yield_stress,
+            hardening_modulus: m.hardening_modulus,
+            hardening_exponent: m.hardening_exponent,
+            rate_coefficient: m.rate_coefficient,
+            reference_strain_rate: m.reference_strain_rate,
+            softening_exponent: m.softening_exponent,
+            melting_temperature: m.melting_temperature,
+            transition_temperature: m.transition_temperature,
+        }
+    }
+
     /// 1 - g^M ([URL23] 42).
     #[inline(always)]
     fn softening<T: Lane>(&self, theta: T) -> T {
@@ -252,7 +266,11 @@ pub(super) mod tests {
             increments[0], increments[41]
         );
         assert!((increments[1] / increments[0] - 1.0).abs() < 1e-12);
-        assert!(increments.windows(2).all(|w| w[1] <= w[0] * (1.0 + 1e-11) + 1e-17));
+        assert!(
+            increments
+                .windows(2)
+                .all(|w| w[1] <= w[0] * (1.0 + 1e-11) + 1e-17)
+        );
         assert!(increments[41] < 1e-15);
         // A temperature that is not set (0 K) does not soften.
         assert_eq!(

@@ -17,6 +17,16 @@ pub struct VonMises {
 }
 
 impl VonMises {
+    /// The yield surface of a scene.
+    pub fn new(m: &crate::scene::VonMises) -> Self {
+        Self {
+            yield_stress: m.yield_stress,
+            hardening_modulus: m.hardening_modulus,
+            saturation: m.saturation_stress.map_or(0.0, |s| s - m.yield_stress),
+            saturation_exponent: m.saturation_exponent.unwrap_or(0.0),
+        }
+    }
+
     /// Yield stress and its slope.
     #[inline(always)]
     fn at<T: Lane>(&self, strain: T) -> (T, T) {
