@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 pub use condition::{Condition, Initial, Support};
 pub use expression::Expression;
-pub use geometry::{BoxGeometry, Geometry, PatchSelection, Spacing};
+pub use geometry::{AxisGrading, BoxGeometry, Geometry, Grading, Jitter, PatchSelection, Spacing};
 pub use material::{Material, MooneyRivlin, NeoHookean};
 pub use numerics::{
     Limiter, Neighbours, Numerics, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
