@@ -40,6 +40,18 @@ pub struct Resultant {
     pub mean_velocity: [f64; 3],
 }
 
+/// Heat through a patch and its temperature; areas of the initial configuration.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct HeatResultant {
+    /// Heat that flows into the body through this patch [W]: flux, convection, and what a
+    /// prescribed temperature draws.
+    pub heat_flow: f64,
+    /// Area-weighted mean temperature [K].
+    pub mean_temperature: f64,
+    /// Highest temperature of its particles [K].
+    pub maximum_temperature: f64,
+}
+
 /// Running totals since time 0: part of the state.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Accounts {

@@ -21,7 +21,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use condition::{Condition, Initial, Support};
+pub use condition::{Condition, Convection, Initial, Support};
 pub use expression::Expression;
 pub use geometry::{AxisGrading, BoxGeometry, Geometry, Grading, Jitter, PatchSelection, Spacing};
 pub use material::{Material, MooneyRivlin, NeoHookean};
