@@ -868,7 +868,7 @@ impl Probes {
             weights: Vec::new(),
         };
         for (name, point) in &scene.probes {
-            let weights = particles.lattice.interpolation(*point).ok_or_else(|| {
+            let weights = particles.interpolation(*point).ok_or_else(|| {
                 Error::scene(format!("probes.{name}"), "the point lies outside the body")
             })?;
             this.names.push(name.clone());

@@ -466,9 +466,7 @@ fn describe(facets: &PatchFacets, particles: &Particles) -> (Patch, Vec<Member>)
             slot: Layout::slot(body),
             position: particles.positions[body],
             area: group.iter().map(|f| f.area).sum(),
-            area_vector: group
-                .iter()
-                .fold([0.0; 3], |s, f| axpy3(s, f.area, f.normal)),
+            area_vector: group.iter().fold([0.0; 3], |s, f| add3(s, f.area_vector)),
         });
     }
     let caller = |m: &Member| particles.caller(m.slot - Layout::FIRST);

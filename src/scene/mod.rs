@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 pub use condition::{Condition, Convection, Initial, Support};
 pub use expression::Expression;
-pub use geometry::{BoxGeometry, Geometry, PatchSelection, Spacing};
+pub use geometry::{AxisGrading, BoxGeometry, Geometry, Grading, Jitter, PatchSelection, Spacing};
 pub use heat::Heat;
 pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
