@@ -624,7 +624,7 @@ fn bad_values_are_refused_with_their_place() {
         ("probes.top centre=[0, 6, 0]", S, "probes.top centre", &["is not a name"]),
         ("output.history_interval=0", S, "output.history_interval", &["above 0"]),
         ("output.field_interval=-1", S, "output.field_interval", &["above 0"]),
-        ("output.fields=[\"velocity\", \"temperature\"]", S, "output.fields[1]", &["no field `temperature`", "`cauchy_stress`"]),
+        ("output.fields=[\"velocity\", \"colour\"]", S, "output.fields[1]", &["no field `colour`", "`cauchy_stress`"]),
         ("output.fields=[\"velocity\", \"velocity\"]", S, "output.fields[1]", &["twice"]),
         // Overrides that have no place.
         ("time.end", A, "", &["`time.end`", "expected `path=value`"]),
