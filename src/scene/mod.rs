@@ -30,7 +30,7 @@ pub use geometry::{
     PatchSelection, PerforatedBox, Sector, Spacing,
 };
 pub use heat::Heat;
-pub use material::{Material, MooneyRivlin, NeoHookean};
+pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
     Limiter, Neighbours, Numerics, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
 };
