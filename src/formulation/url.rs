@@ -170,6 +170,17 @@ impl State {
     pub fn history_at(&self, slot: usize) -> History<f64> {
         self.history.as_ref().map_or(VIRGIN, |h| h.get(slot))
     }
+    /// Sets f of the particle in a slot, and h and j where they are independent.
+    pub fn deform(&mut self, slot: usize, f: Mat3<f64>) {
+        let cof = cofactor(&f);
+        self.f.set(slot, flat(&f));
+        if let Some(h) = &mut self.h {
+            h.set(slot, flat(&cof));
+        }
+        if let Some(j) = &mut self.j {
+            j.set(slot, [dot(f[0], cof[0])]);
+        }
+    }
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.x.bytes()
@@ -787,16 +798,7 @@ pub fn deform(state: &mut State, reference: &Reference) {
         gradient::<Vectors>(reference, x, slab, &mut out);
     });
     for slot in (0..layout.particles).map(Layout::slot) {
-        let own = f.get(slot);
-        let m = matrix(&own);
-        let cof = cofactor(&m);
-        state.f.set(slot, own);
-        if let Some(h) = &mut state.h {
-            h.set(slot, flat(&cof));
-        }
-        if let Some(j) = &mut state.j {
-            j.set(slot, [dot(m[0], cof[0])]);
-        }
+        state.deform(slot, matrix(&f.get(slot)));
     }
 }
 

@@ -5,7 +5,12 @@
 mod columns;
 mod conservation;
 mod elastic_cube;
+mod heat;
+mod homogeneous;
 mod numerics;
 mod reproducibility;
+mod slab_heating;
 mod stability;
 mod support;
+mod swinging_cube;
+mod thermo_wave;
