@@ -178,7 +178,7 @@ impl Simulation {
             &this.url,
             &mut this.state,
             &this.reference,
-            0.0,
+            (0.0, |_, (_, heat)| heat),
             &this.inputs,
         )?;
         this.evaluate().map_err(|e| {
@@ -463,8 +463,12 @@ impl Simulation {
                 if last {
                     accounts.plastic += url.commit(state, reference, dt);
                 }
+                // The entropy that a support adds makes up for that of the stage's rates: its heat is
+                // that at their temperature, so that the ledger is of the integrator's order.
+                let supplied = |slot, (entropy, _)| url.evaluated_temperature(slot) * entropy;
+                let now = (next, supplied);
                 accounts.heat_in +=
-                    stage.carry * hold_temperatures(boundary, url, state, reference, next, inputs)?;
+                    stage.carry * hold_temperatures(boundary, url, state, reference, now, inputs)?;
                 if last && is_stale(numerics, steps) {
                     url.update_reference(state, reference)
                         .map_err(|b| diverged(b, state))?;
@@ -518,7 +522,7 @@ impl Simulation {
                     &self.url,
                     state,
                     &self.reference,
-                    self.time,
+                    (self.time, |_, (_, heat)| heat),
                     inputs,
                 )
             });
@@ -991,20 +995,21 @@ fn is_stale(numerics: &Numerics, steps: u64) -> bool {
     }
 }
 
-/// Gives the particles with a prescribed temperature theirs; the heat that this takes [J].
+/// Gives the particles with a prescribed temperature theirs at time `t`; the heat that this takes [J],
+/// by `supplied(slot, (entropy, heat))` of a particle's entropy and heat.
 fn hold_temperatures(
     boundary: &Boundary,
     url: &Url,
     state: &mut State,
     reference: &Reference,
-    t: f64,
+    (t, supplied): (f64, impl Fn(usize, (f64, f64)) -> f64),
     inputs: &InputValues,
 ) -> Result<f64> {
-    let mut supplied = 0.0;
+    let mut total = 0.0;
     boundary.hold_temperatures(t, inputs, |slot, theta| {
-        supplied += url.set_temperature(state, reference, slot, theta);
+        total += supplied(slot, url.set_temperature(state, reference, slot, theta));
     })?;
-    Ok(supplied)
+    Ok(total)
 }
 
 fn diverged(b: Breakdown, state: &State, order: &[u32], time: f64) -> Error {

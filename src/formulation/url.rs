@@ -321,23 +321,28 @@ impl Url {
         }
     }
 
-    /// Sets the temperature [K] of the particle in a slot at its present deformation; the heat that
-    /// this takes [J].
+    /// Sets the temperature [K] of the particle in a slot at its present deformation; the entropy
+    /// [J/K] and the heat [J] that this takes.
     pub fn set_temperature(
         &self,
         state: &mut State,
         reference: &Reference,
         slot: usize,
         theta: f64,
-    ) -> f64 {
+    ) -> (f64, f64) {
         let d = self.deformation(state, reference, slot);
         let (Some(eta), Some(thermal)) = (&mut state.eta, self.options.thermal) else {
-            return 0.0;
+            return (0.0, 0.0);
         };
-        let before = thermal.warmth(&d, eta.get(slot)[0]).energy;
-        eta.set(slot, [thermal.entropy(&d, theta)]);
-        let after = thermal.warmth(&d, eta.get(slot)[0]).energy;
-        reference.volume.get(slot)[0] * (after - before)
+        let before = eta.get(slot)[0];
+        let after = thermal.entropy(&d, theta);
+        eta.set(slot, [after]);
+        let energy = |eta| thermal.warmth(&d, eta).energy;
+        let volume = reference.volume.get(slot)[0];
+        (
+            volume * (after - before),
+            volume * (energy(after) - energy(before)),
+        )
     }
 
     /// Constants of a body with heat.

@@ -6,7 +6,7 @@ use urlsph::{Code, Energies, Field, Scene, Simulation};
 use crate::support::*;
 
 /// What a run with heat showed, step by step.
-struct Observed {
+pub struct Observed {
     start: Energies,
     end: Energies,
     /// Least entropy that conduction and plastic flow produced in a step [J/K].
@@ -21,7 +21,8 @@ struct Observed {
     ballistic: f64,
 }
 
-fn observe(simulation: &mut Simulation, end: f64) -> Observed {
+/// Runs to `end` and looks after every step.
+pub fn observe(simulation: &mut Simulation, end: f64) -> Observed {
     let start = simulation.energies();
     let mut before = start;
     let mut found = Observed {

@@ -8,6 +8,7 @@ mod elastic_cube;
 mod heat;
 mod homogeneous;
 mod numerics;
+mod punch;
 mod reproducibility;
 mod slab_heating;
 mod stability;
