@@ -117,10 +117,11 @@ fn l_block(overrides: &[&str]) {
         free.ballistic,
         0.0,
     );
+    // What the integrator dissipates at the default step; `the_ledger_closes_with_heat` has its order.
     check(
         &format!("{what}: error of the ledger over the kinetic energy"),
         free.closure / free.end.kinetic,
-        1e-4,
+        5e-3,
     );
 }
 
