@@ -260,30 +260,30 @@ fn prescribed_temperatures_balance() {
         (before, last) = (s.time(), now);
     });
     let end = simulation.energies();
-    let stored = end.thermal - initial.thermal;
-    check(
-        "slab, two temperatures: heat in less heat stored",
-        (end.heat_in / stored - 1.0).abs(),
-        1e-6,
-    );
+    // At the start the temperature jumps from particle to particle, which is the worst for a step.
+    for (what, from, tolerance) in [("from the start", &initial, 2e-4), ("later", &start, 1e-6)] {
+        let stored = end.thermal - from.thermal;
+        let error = ((end.heat_in - from.heat_in) / stored - 1.0).abs();
+        check(
+            &format!("slab, two temperatures: heat in less heat stored, {what}"),
+            error,
+            tolerance,
+        );
+    }
     let taken = end.heat_in - start.heat_in;
     check(
         "slab, two temperatures: flows of the patches less heat in",
         (supplied / taken - 1.0).abs(),
         1e-3,
     );
+    // q = k theta^2 grad(1/theta) is linear in the temperature only to second order in the spacing:
+    // (100 K/(340 K 20 cells))^2/2 = 1.1e-4.
     let exact = 20_000.0 * 100.0 * 0.05 * 0.05;
     let [hot, cold] = flows(&simulation);
-    check(
-        "slab, two temperatures: heat flow in",
-        (hot / exact - 1.0).abs(),
-        1e-4,
-    );
-    check(
-        "slab, two temperatures: heat flow out",
-        (cold / exact + 1.0).abs(),
-        1e-4,
-    );
+    let error = (hot / exact - 1.0).abs();
+    check("slab, two temperatures: heat flow in", error, 2e-4);
+    let error = (cold / hot + 1.0).abs();
+    check("slab, two temperatures: heat flow in less out", error, 1e-6);
 }
 
 /// Memory per particle [numbers] of the cube with overrides.
