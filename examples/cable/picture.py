@@ -28,7 +28,7 @@ def history(urlsph, scene, limiter, folder):
     out = folder / f"{scene}_{limiter}"
     subprocess.run(
         [urlsph, "run", HERE / f"{scene}.json", "--out", out, "--quiet"]
-        + ["--set", f"numerics.limiter={limiter}", "--set", "output.history_interval=0.02"],
+        + ["--set", f"numerics.limiter={limiter}", "--set", "output.history_interval=0.08"],
         check=True,
     )
     return read_table(out / "history.csv")

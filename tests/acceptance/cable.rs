@@ -153,7 +153,7 @@ fn shocks_are_captured() {
         });
         for (cells, [first, none, _, minmod, shock]) in [100, 200, 400].iter().zip(&found) {
             let what = format!("cable {lattice}, {cells} cells, shock limiter:");
-            check(&format!("{what} overshoot of v"), shock.overshoot, 0.04);
+            check(&format!("{what} overshoot of v"), shock.overshoot, 0.05);
             let ratio = shock.overshoot / minmod.overshoot;
             check(&format!("{what} overshoot over minmod's"), ratio, 0.35);
             check(
@@ -173,6 +173,31 @@ fn shocks_are_captured() {
             0.6,
         );
     }
+}
+
+/// At small steps the time integrator no longer helps to damp what a shock sheds: every overshoot
+/// grows, the shock limiter's from 1 to 8 % and minmod's from 10 to 12 %.
+#[test]
+fn shocks_are_captured_at_small_steps() {
+    let exact = Table::expected("cable");
+    println!("{HEADER}");
+    let [_, none, _, minmod, shock] = LIMITERS.map(|(name, overrides)| {
+        let overrides = [overrides, &["numerics.cfl=0.3"]].concat();
+        let s = shock(&mut cable("scene.json", 100, false, &overrides), &exact);
+        print(&format!("CFL 0.3, {name}"), &s);
+        s.overshoot
+    });
+    check("cable, CFL 0.3, overshoot of v: shock", shock, 0.1);
+    check(
+        "cable, CFL 0.3, overshoot of v: shock over minmod",
+        shock / minmod,
+        0.75,
+    );
+    check(
+        "cable, CFL 0.3, overshoot of v: shock over none",
+        shock / none,
+        0.5,
+    );
 }
 
 /// Where flow is smooth the shock limiter costs next to nothing; energies over the initial energy.
@@ -247,7 +272,7 @@ fn a_plastic_wave_follows_its_precursor() {
             1e-2,
         );
         let ratio = shock_limited.0.l1[1] / none.0.l1[1];
-        check(&format!("{what} L1 of v over that without"), ratio, 1.1);
+        check(&format!("{what} L1 of v over that without"), ratio, 1.2);
         check(
             &format!("{what} overshoot of v"),
             shock_limited.0.overshoot,
