@@ -57,6 +57,7 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
     let dissipation = match (n.reconstruction, n.limiter) {
         (Reconstruction::None, _) => "Riemann dissipation D^p, first order",
         (_, Limiter::None) => "Riemann dissipation D^p, linear reconstruction",
+        (_, Limiter::Shock) => "Riemann dissipation D^p, linear reconstruction, shock limiter",
         (_, Limiter::Minmod) => "Riemann dissipation D^p, linear reconstruction, minmod limiter",
         (_, Limiter::Venkatakrishnan) => {
             "Riemann dissipation D^p, linear reconstruction, Venkatakrishnan limiter"

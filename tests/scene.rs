@@ -659,7 +659,7 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.volume_dissipation=0.1", S, "numerics.volume_dissipation", &["`fj` or `fhj`"]),
         ("numerics.volume_dissipation=-0.1", S, "numerics.volume_dissipation", &["0 or more"]),
         ("numerics={\"limiter\": \"minmod\", \"reconstruction\": \"none\"}", S, "numerics.limiter", &["to be `linear`"]),
-        ("numerics={\"limiter\": \"minmod\", \"dissipation\": false}", S, "numerics.limiter", &["switched off"]),
+        ("numerics={\"limiter\": \"shock\", \"dissipation\": false}", S, "numerics.limiter", &["switched off"]),
         ("numerics.cfl=0", S, "numerics.cfl", &["more than 0"]),
         ("numerics.cfl=2.5", S, "numerics.cfl", &["at most 2"]),
         ("numerics.time_step=0", S, "numerics.time_step", &["above 0"]),

@@ -207,6 +207,7 @@ impl Url {
             (false, ..) => riemann::OFF,
             (true, false, _) => riemann::CONSTANT,
             (true, true, Limiter::Minmod) => riemann::MINMOD,
+            (true, true, Limiter::Shock) => riemann::SHOCK,
             (true, true, _) => riemann::LINEAR,
         };
         let volume = numerics.volume_dissipation > 0.0;
@@ -224,8 +225,7 @@ impl Url {
             scratch: Scratch {
                 q: Array::new(layout, [0.0; 9]),
                 s: areas.then(|| Array::new(layout, [0.0; 9])),
-                half_grad: matches!(mode, riemann::LINEAR | riemann::MINMOD)
-                    .then(|| Array::new(layout, [0.0; 9])),
+                half_grad: riemann::reconstructs(mode).then(|| Array::new(layout, [0.0; 9])),
                 wave: Array::new(layout, [1.0; 2]),
                 sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
                 theta: thermal.map(|_| Array::new(layout, [1.0; 2])),
@@ -534,11 +534,11 @@ impl Url {
                         $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
                             pairs: $pairs, input, speeds, slab, out,
                         }),)*
-                        _ => unreachable!("four modes"),
+                        _ => unreachable!("five modes"),
                     }
                 };
             }
-            with_pairs!(reference, pairs => forces!(pairs, CONSTANT, LINEAR, MINMOD, OFF))
+            with_pairs!(reference, pairs => forces!(pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF))
         })
     }
 
@@ -873,6 +873,7 @@ mod tests {
                 "numerics.limiter=minmod",
                 "numerics.weights=tributary",
             ],
+            &["numerics.limiter=shock"],
             &[
                 "numerics.neighbours={\"radius\": 2.1}",
                 "numerics.limiter=venkatakrishnan",

@@ -141,6 +141,9 @@ pub enum Limiter {
     Venkatakrishnan,
     /// Edge-wise minmod.
     Minmod,
+    /// First order in pressure waves that the particles do not resolve; smooth flow and shear are
+    /// left alone.
+    Shock,
 }
 
 impl<'de> Deserialize<'de> for Neighbours {

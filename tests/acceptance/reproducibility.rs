@@ -50,6 +50,7 @@ const VARIANTS: &[(&str, &[&str])] = &[
         "column_bending",
         &["numerics.limiter=minmod", "numerics.weights=tributary"],
     ),
+    ("column_tension", &["numerics.limiter=shock"]),
     (
         "column_bending",
         &[
