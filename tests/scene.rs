@@ -10,7 +10,7 @@ use urlsph::scene::{
 };
 use urlsph::{Code, Error};
 
-const EXAMPLES: [&str; 10] = [
+const EXAMPLES: [&str; 11] = [
     "column_tension",
     "column_bending",
     "column_twisting",
@@ -21,6 +21,7 @@ const EXAMPLES: [&str; 10] = [
     "slab_heating",
     "homogeneous",
     "l_block_thermal",
+    "punch",
 ];
 
 fn example_path(name: &str) -> PathBuf {

@@ -170,6 +170,17 @@ impl State {
     pub fn history_at(&self, slot: usize) -> History<f64> {
         self.history.as_ref().map_or(VIRGIN, |h| h.get(slot))
     }
+    /// Sets f of the particle in a slot, and h and j where they are independent.
+    pub fn deform(&mut self, slot: usize, f: Mat3<f64>) {
+        let cof = cofactor(&f);
+        self.f.set(slot, flat(&f));
+        if let Some(h) = &mut self.h {
+            h.set(slot, flat(&cof));
+        }
+        if let Some(j) = &mut self.j {
+            j.set(slot, [dot(f[0], cof[0])]);
+        }
+    }
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.x.bytes()
@@ -310,23 +321,28 @@ impl Url {
         }
     }
 
-    /// Sets the temperature [K] of the particle in a slot at its present deformation; the heat that
-    /// this takes [J].
+    /// Sets the temperature [K] of the particle in a slot at its present deformation; the entropy
+    /// [J/K] and the heat [J] that this takes.
     pub fn set_temperature(
         &self,
         state: &mut State,
         reference: &Reference,
         slot: usize,
         theta: f64,
-    ) -> f64 {
+    ) -> (f64, f64) {
         let d = self.deformation(state, reference, slot);
         let (Some(eta), Some(thermal)) = (&mut state.eta, self.options.thermal) else {
-            return 0.0;
+            return (0.0, 0.0);
         };
-        let before = thermal.warmth(&d, eta.get(slot)[0]).energy;
-        eta.set(slot, [thermal.entropy(&d, theta)]);
-        let after = thermal.warmth(&d, eta.get(slot)[0]).energy;
-        reference.volume.get(slot)[0] * (after - before)
+        let before = eta.get(slot)[0];
+        let after = thermal.entropy(&d, theta);
+        eta.set(slot, [after]);
+        let energy = |eta| thermal.warmth(&d, eta).energy;
+        let volume = reference.volume.get(slot)[0];
+        (
+            volume * (after - before),
+            volume * (energy(after) - energy(before)),
+        )
     }
 
     /// Constants of a body with heat.
@@ -787,16 +803,7 @@ pub fn deform(state: &mut State, reference: &Reference) {
         gradient::<Vectors>(reference, x, slab, &mut out);
     });
     for slot in (0..layout.particles).map(Layout::slot) {
-        let own = f.get(slot);
-        let m = matrix(&own);
-        let cof = cofactor(&m);
-        state.f.set(slot, own);
-        if let Some(h) = &mut state.h {
-            h.set(slot, flat(&cof));
-        }
-        if let Some(j) = &mut state.j {
-            j.set(slot, [dot(m[0], cof[0])]);
-        }
+        state.deform(slot, matrix(&f.get(slot)));
     }
 }
 

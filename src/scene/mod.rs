@@ -23,7 +23,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::particles::MeshFile;
-pub use condition::{Condition, Convection, Initial, Support};
+pub use condition::{Condition, Convection, Initial, InitialGradient, Support};
 pub use expression::Expression;
 pub use geometry::{
     Axis, AxisGrading, BoxGeometry, CylinderGeometry, Geometry, Grading, Jitter, MeshGeometry,
