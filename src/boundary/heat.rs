@@ -5,13 +5,17 @@ use super::{Boundary, InputValues, Quantity, Source};
 use crate::error::{Error, Result};
 use crate::layout::Array;
 use crate::ledger::HeatResultant;
-use crate::scene::{Condition, Scalar, Scene};
+use crate::parallel;
+use crate::reference::Reference;
+use crate::scene::{Condition, Scalar, ScalarFunction, Scene};
 
 /// Heat conditions of a body.
 #[derive(Debug, Default)]
 pub(super) struct Heat {
     flows: Vec<Flow>,
     held: Vec<Held>,
+    /// r_R [W/m^3], per unit initial volume.
+    source: Option<ScalarFunction>,
 }
 
 /// Heat that flows in through a patch.
@@ -39,6 +43,17 @@ struct Held {
     source: Source,
     /// The patches that prescribe it, with the particle's place in each: the first has the source.
     patches: Vec<(usize, usize)>,
+}
+
+impl Heat {
+    /// The heat source of a scene; the patches' conditions follow one by one.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let source = scene.heat.as_ref().and_then(|heat| heat.source.as_ref());
+        Ok(Self {
+            source: source.map(Scalar::compile).transpose()?,
+            ..Self::default()
+        })
+    }
 }
 
 impl Boundary {
@@ -124,11 +139,6 @@ impl Boundary {
         Ok(())
     }
 
-    /// Whether any particle's temperature is prescribed.
-    pub fn holds_temperatures(&self) -> bool {
-        !self.heat.held.is_empty()
-    }
-
     /// Heat per unit initial area that flows in at one particle of a patch [W/m^2].
     fn flux(
         &self,
@@ -152,16 +162,51 @@ impl Boundary {
         }
     }
 
-    /// Adds the heat that flows in through all patches at time `t` to `heat` [W per particle];
+    /// Adds V_R r_R at time `t`; returns its sum.
+    fn add_source(&self, heat: &mut Array<1>, reference: &Reference, t: f64) -> Result<f64> {
+        let Some(source) = &self.heat.source else {
+            return Ok(0.0);
+        };
+        let layout = reference.layout;
+        let x = reference.x_initial.components();
+        let volume = reference.volume.components()[0];
+        let constant = (!source.depends_on_space()).then(|| source.eval([0.0; 3], t));
+        let powers = parallel::map_slabs(heat.slabs_mut(), |slab, [out]| {
+            let (first, _) = layout.slab_range(slab);
+            let mut power = 0.0;
+            for (i, heat) in out.iter_mut().enumerate() {
+                let a = first + i;
+                if volume[a] == 0.0 {
+                    continue;
+                }
+                let r = constant.unwrap_or_else(|| source.eval([x[0][a], x[1][a], x[2][a]], t));
+                if !r.is_finite() {
+                    return Err(a);
+                }
+                *heat += volume[a] * r;
+                power += volume[a] * r;
+            }
+            Ok(power)
+        });
+        powers
+            .into_iter()
+            .try_fold(0.0, |total, power| match power {
+                Ok(power) => Ok(total + power),
+                Err(a) => Err(self.not_finite("heat.source", a, reference, t)),
+            })
+    }
+
+    /// Adds the heat of the source and that flows in through all patches at time `t` to `heat` [W per particle];
     /// returns its sum [W]. `temperature` gives the present temperature of a slot [K].
     pub fn add_heat(
         &self,
         heat: &mut Array<1>,
         temperature: impl Fn(usize) -> f64,
+        reference: &Reference,
         t: f64,
         inputs: &InputValues,
     ) -> Result<f64> {
-        let mut power = 0.0;
+        let mut power = self.add_source(heat, reference, t)?;
         for flow in &self.heat.flows {
             for (index, member) in self.members[flow.patch].iter().enumerate() {
                 let theta = temperature(member.slot);
@@ -201,12 +246,13 @@ impl Boundary {
         Ok(super::rate([now], (t, span), |time| value(time).map(|v| [v]))[0])
     }
 
-    /// Heat resultants of all patches. `heat` is all heat but that of the prescribed temperatures
-    /// [W per particle], with the flow through the patches in place; `stored(slot, rate)` is the
+    /// Heat resultants of all patches. `heat` is the heat by conduction [W per particle];
+    /// `stored(slot, rate)` is the
     /// heat that a particle takes up while its temperature changes at that rate [W].
     pub fn heat_resultants(
         &self,
         heat: &Array<1>,
+        reference: &Reference,
         temperature: impl Fn(usize) -> f64,
         stored: impl Fn(usize, f64) -> f64,
         (t, span): (f64, f64),
@@ -233,6 +279,11 @@ impl Boundary {
                     member.area * self.flux(flow, index, theta, t, inputs)?;
             }
         }
+        if self.heat.held.is_empty() {
+            return Ok(resultants);
+        }
+        let mut heat = heat.clone();
+        self.add_heat(&mut heat, &temperature, reference, t, inputs)?;
         for held in &self.heat.held {
             // What the surroundings supply = what is stored - all other heat.
             let rate = self.held_rate(held, (t, span), inputs)?;

@@ -122,16 +122,27 @@ impl Boundary {
             .into_iter()
             .try_fold(0.0, |total, power| match power {
                 Ok(power) => Ok(total + power),
-                Err(a) => Err(Error::scene(
-                    "body_force",
-                    "the value is not finite here: check the expression for this place and time",
-                )
-                .at_particle(
-                    self.order[a - Layout::FIRST] as usize,
-                    Some(reference.x_initial.get(a)),
-                )
-                .at_time(t)),
+                Err(a) => Err(self.not_finite("body_force", a, reference, t)),
             })
+    }
+
+    /// The error of a volume load without a finite value in a slot.
+    pub(super) fn not_finite(
+        &self,
+        path: &str,
+        slot: usize,
+        reference: &Reference,
+        t: f64,
+    ) -> Error {
+        Error::scene(
+            path,
+            "the value is not finite here: check the expression for this place and time",
+        )
+        .at_particle(
+            self.order[slot - Layout::FIRST] as usize,
+            Some(reference.x_initial.get(slot)),
+        )
+        .at_time(t)
     }
 
     /// Internal forces (in `url.rates.force`), loads and body force, without support reactions [N].

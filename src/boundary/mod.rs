@@ -2,7 +2,6 @@
 //!
 //! Only the particles of patches are visited: the loops over the body know nothing of boundaries.
 
-#[expect(dead_code, reason = "the time step does not carry heat yet")]
 mod heat;
 mod loads;
 mod supports;
@@ -193,7 +192,7 @@ impl Boundary {
             members: Vec::new(),
             loads: Vec::new(),
             supports: Vec::new(),
-            heat: Heat::default(),
+            heat: Heat::new(scene)?,
             body_force: scene.body_force.as_ref().map(|f| f.compile()).transpose()?,
             order: particles.order.clone(),
         };
@@ -219,7 +218,7 @@ impl Boundary {
             this.supports_on(patch, condition, particles, &mut constraints)?;
             this.heat_on(patch, condition, scene)?;
         }
-        let density = crate::material::Law::new(&scene.material).density();
+        let density = crate::material::Law::of(scene).0.density();
         this.combine_supports(constraints, particles, density)?;
         Ok(this)
     }
@@ -467,9 +466,7 @@ fn describe(facets: &PatchFacets, particles: &Particles) -> (Patch, Vec<Member>)
             slot: Layout::slot(body),
             position: particles.positions[body],
             area: group.iter().map(|f| f.area).sum(),
-            area_vector: group
-                .iter()
-                .fold([0.0; 3], |s, f| axpy3(s, f.area, f.normal)),
+            area_vector: group.iter().fold([0.0; 3], |s, f| add3(s, f.area_vector)),
         });
     }
     let caller = |m: &Member| particles.caller(m.slot - Layout::FIRST);

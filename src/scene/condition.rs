@@ -75,6 +75,9 @@ pub struct Initial {
     /// Displacement [m]; the deformation gradient follows from it by the discrete gradient.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displacement: Option<Vector>,
+    /// Temperature [K]; needs the section `heat`, whose reference temperature is the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<Scalar>,
 }
 
 pub(super) fn validate(path: &str, condition: &Condition) -> Result<()> {
@@ -132,6 +135,20 @@ pub(super) fn validate(path: &str, condition: &Condition) -> Result<()> {
 }
 
 pub(super) fn initial(initial: &Initial) -> Result<()> {
+    if let Some(temperature) = &initial.temperature {
+        let path = "initial.temperature";
+        require(
+            matches!(temperature, Scalar::Constant(_) | Scalar::Expression(_)),
+            path,
+            "an initial temperature is a number or an expression in X, Y and Z",
+        )?;
+        let function = temperature.compile().map_err(|e| below(path, e))?;
+        require(
+            !function.depends_on_time(),
+            path,
+            "an initial value cannot depend on t",
+        )?;
+    }
     for (name, field) in [
         ("velocity", &initial.velocity),
         ("displacement", &initial.displacement),
