@@ -17,6 +17,7 @@
 
 use super::Boundary;
 use crate::error::{Error, Result};
+use crate::formulation::url::State;
 use crate::integrator::SSP_RK3;
 use crate::lane::SLICE;
 use crate::layout::{Array, Layout};
@@ -66,6 +67,10 @@ pub struct Exchange {
 pub struct Approach {
     near: Vec<Near>,
     sides: Vec<Side>,
+    /// How far each plane moves [m].
+    displacements: Vec<f64>,
+    /// Work of the moving planes so far [J].
+    work: f64,
 }
 
 /// A particle near one plane or more.
@@ -107,11 +112,6 @@ struct Side {
 const TOUCHING: f64 = 1e-9;
 /// Round-off of a gap, in units of a particle's size.
 const ROUND_OFF: f64 = 1e-12;
-
-/// Share of a velocity change after stage `i` that is left at the step's end.
-fn carried(i: usize) -> f64 {
-    SSP_RK3[i + 1..].iter().map(|s| s.take).product()
-}
 
 impl Wall {
     /// Distance from the plane, displaced by `displacement`, to a point [m].
@@ -171,41 +171,62 @@ fn push(v: [f64; 3], sides: &mut [Side]) -> [f64; 3] {
     new
 }
 
-impl Boundary {
-    pub(super) fn walls_of(scene: &Scene, particles: &Particles) -> Result<Vec<Wall>> {
-        let mut walls = Vec::with_capacity(scene.contact.len());
-        for (name, wall) in &scene.contact {
-            let members = match &wall.patch {
-                None => None,
-                Some(patch) => {
-                    let facets = particles.patches.iter().find(|p| p.name == *patch);
-                    let facets = facets.ok_or_else(|| {
-                        Error::scene(
-                            format!("contact.{name}.patch"),
-                            format!("the patch `{patch}` selects no particle"),
-                        )
-                    })?;
-                    let mut members = vec![false; Layout::slot(particles.positions.len())];
-                    for facet in &facets.facets {
-                        members[Layout::slot(facet.particle as usize)] = true;
-                    }
-                    Some(members)
+/// The planes of a scene.
+pub(super) fn walls(scene: &Scene, particles: &Particles) -> Result<Vec<Wall>> {
+    let mut walls = Vec::with_capacity(scene.contact.len());
+    for (name, wall) in &scene.contact {
+        let members = match &wall.patch {
+            None => None,
+            Some(patch) => {
+                let facets = particles.patches.iter().find(|p| p.name == *patch);
+                let facets = facets.ok_or_else(|| {
+                    Error::scene(
+                        format!("contact.{name}.patch"),
+                        format!("the patch `{patch}` selects no particle"),
+                    )
+                })?;
+                let mut members = vec![false; Layout::slot(particles.positions.len())];
+                for facet in &facets.facets {
+                    members[Layout::slot(facet.particle as usize)] = true;
                 }
-            };
-            let length = dot(wall.normal, wall.normal).sqrt();
-            walls.push(Wall {
-                name: name.clone(),
-                point: wall.point,
-                normal: scale3(1.0 / length, wall.normal),
-                velocity: match &wall.velocity {
-                    Some(velocity) => velocity.compile()?,
-                    None => ScalarFunction::Constant(0.0),
-                },
-                separation: wall.separation,
-                members,
-            });
-        }
-        Ok(walls)
+                Some(members)
+            }
+        };
+        let length = dot(wall.normal, wall.normal).sqrt();
+        walls.push(Wall {
+            name: name.clone(),
+            point: wall.point,
+            normal: scale3(1.0 / length, wall.normal),
+            velocity: match &wall.velocity {
+                Some(velocity) => velocity.compile()?,
+                None => ScalarFunction::Constant(0.0),
+            },
+            separation: wall.separation,
+            members,
+        });
+    }
+    Ok(walls)
+}
+
+impl Boundary {
+    /// No plane has moved or pushed yet.
+    pub fn walls_at_rest(&self) -> Vec<WallState> {
+        vec![WallState::default(); self.walls.len()]
+    }
+
+    /// Names of the planes.
+    pub fn wall_names(&self) -> impl Iterator<Item = &str> {
+        self.walls.iter().map(|wall| wall.name.as_str())
+    }
+
+    /// What the planes have done, without what touches them now.
+    pub(super) fn resting_contacts(&self, walls: &[WallState]) -> Vec<ContactResultant> {
+        let resultant = |(wall, state): (&Wall, &WallState)| ContactResultant {
+            impulse: scale3(state.impulse, wall.normal),
+            displacement: state.displacement,
+            ..ContactResultant::default()
+        };
+        self.walls.iter().zip(walls).map(resultant).collect()
     }
 
     /// Every particle within `reach(v . n)` of a plane, in order, with the plane and the gap.
@@ -267,7 +288,11 @@ impl Boundary {
             sides.push(Side {
                 wall,
                 direction,
-                closing: if gap.abs() <= ROUND_OFF * size { 0.0 } else { gap },
+                closing: if gap.abs() <= ROUND_OFF * size {
+                    0.0
+                } else {
+                    gap
+                },
                 travelled: 0.0,
                 held: touches && !self.walls[wall].separation,
                 push: 0.0,
@@ -283,12 +308,11 @@ impl Boundary {
     /// A particle that starts behind a plane.
     pub fn first_contact(
         &self,
-        x: &Array<3>,
-        v: &mut Array<3>,
-        walls: &[WallState],
+        state: &mut State,
+        walls: &mut [WallState],
         reference: &Reference,
-        density: f64,
     ) -> Result<Exchange> {
+        let State { x, v, .. } = state;
         let mut exchange = Exchange::default();
         let volume = reference.volume.components()[0];
         let size = |slot: usize| volume[slot].cbrt();
@@ -311,15 +335,21 @@ impl Boundary {
             sides.clear();
             self.sides(group, &mut sides, size(slot));
             for side in &mut sides {
-                side.floor = self.walls[side.wall].velocity(0.0)?;
+                let wall = &self.walls[side.wall];
+                side.floor =
+                    wall.velocity(0.0)? - dot(v.get(slot), sub3(wall.normal, side.direction));
             }
-            let (old, mass) = (v.get(slot), density * volume[slot]);
+            let (old, mass) = (v.get(slot), self.density * volume[slot]);
             let new = push(old, &mut sides);
-            let work: f64 = (sides.iter().map(|s| mass * s.push * s.floor)).sum();
-            exchange.work += work;
-            exchange.dissipation += work - 0.5 * mass * (dot(new, new) - dot(old, old));
+            for side in &sides {
+                let impulse = mass * side.push;
+                walls[side.wall].impulse += impulse;
+                exchange.work += impulse * self.walls[side.wall].velocity(0.0)?;
+            }
+            exchange.dissipation -= 0.5 * mass * (dot(new, new) - dot(old, old));
             v.set(slot, new);
         }
+        exchange.dissipation += exchange.work;
         Ok(exchange)
     }
 
@@ -328,22 +358,25 @@ impl Boundary {
     pub fn approach(
         &self,
         approach: &mut Approach,
-        (x, v): (&Array<3>, &Array<3>),
+        state: &State,
         walls: &[WallState],
         reference: &Reference,
-        (density, wave_speed): (f64, f64),
+        wave_speed: f64,
         (t, dt): (f64, f64),
     ) -> Result<()> {
         approach.near.clear();
         approach.sides.clear();
+        approach.work = 0.0;
         if self.walls.is_empty() {
             return Ok(());
         }
-        let displacements = self.wall_displacements(t, dt)?;
+        approach.displacements = self.wall_displacements(t, dt)?;
+        let displacements = &approach.displacements;
         let reach = |wall: usize, speed: f64, _| {
             dt * (speed.abs() + wave_speed) + displacements[wall].abs()
         };
         let volume = reference.volume.components()[0];
+        let State { x, v, .. } = state;
         let found = self.within((x, v), walls, reach);
         for group in found.chunk_by(|a, b| a.0 == b.0) {
             let slot = group[0].0;
@@ -351,7 +384,7 @@ impl Boundary {
             for side in &mut approach.sides[sides.0..sides.1] {
                 side.closing = (side.closing - displacements[side.wall]) / dt;
             }
-            let mass = density * volume[slot];
+            let mass = self.density * volume[slot];
             let along = mat_vec(&span, v.get(slot));
             approach.near.push(Near {
                 slot,
@@ -377,7 +410,14 @@ impl Boundary {
     }
 
     /// Before stage `i`: what the other forces do, and how far the particles travel.
-    pub fn follow(&self, approach: &mut Approach, i: usize, force: &Array<3>, v: &Array<3>, dt: f64) {
+    pub fn follow(
+        &self,
+        approach: &mut Approach,
+        i: usize,
+        force: &Array<3>,
+        v: &Array<3>,
+        dt: f64,
+    ) {
         let weight = SSP_RK3[i].weight;
         for near in &mut approach.near {
             let v = v.get(near.slot);
@@ -396,36 +436,91 @@ impl Boundary {
         v: &mut Array<3>,
         walls: &mut [WallState],
         t: f64,
-    ) -> Result<f64> {
+    ) -> Result<()> {
         let to_come: f64 = SSP_RK3[i + 1..].iter().map(|s| s.weight).sum();
-        let mut work = 0.0;
         for near in &mut approach.near {
             let sides = &mut approach.sides[near.sides.0..near.sides.1];
             let old = v.get(near.slot);
             for side in &mut *sides {
                 let wall = &self.walls[side.wall];
                 let gap = side.closing + side.travelled;
-                // The supports' part of the normal velocity is settled.
-                let settled = dot(old, sub3(wall.normal, side.direction));
                 let floor = if to_come > 0.0 {
                     -gap / to_come
                 } else {
                     // The next step starts from here: it must not arrive before its end.
                     wall.velocity(t)? - gap.max(0.0)
                 };
-                side.floor = floor - settled;
+                // The part of the normal velocity that the supports hold is settled.
+                side.floor = floor - dot(old, sub3(wall.normal, side.direction));
             }
             let new = push(old, sides);
             for side in &*sides {
                 if side.push != 0.0 {
                     near.pushed = true;
-                    let impulse = carried(i) * near.mass * side.push;
+                    let impulse = SSP_RK3[i].carry * near.mass * side.push;
                     walls[side.wall].impulse += impulse;
-                    work += impulse * self.walls[side.wall].velocity(t)?;
+                    approach.work += impulse * self.walls[side.wall].velocity(t)?;
                 }
             }
             v.set(near.slot, new);
         }
-        Ok(work)
+        Ok(())
+    }
+
+    /// At the step's end: the planes have moved; what they did to the energy.
+    ///
+    /// What the pushes took = what the particles lost beyond the work of all other forces. For a
+    /// resting plane that is dissipation; of a moving one its work comes in.
+    pub fn settle(&self, approach: &Approach, v: &Array<3>, walls: &mut [WallState]) -> Exchange {
+        let mut gain = 0.0;
+        for near in approach.near.iter().filter(|near| near.pushed) {
+            let along = mat_vec(&near.span, v.get(near.slot));
+            gain += 0.5 * near.mass * dot(along, along) - near.kinetic - near.work;
+        }
+        for (wall, displacement) in walls.iter_mut().zip(&approach.displacements) {
+            wall.displacement += displacement;
+        }
+        Exchange {
+            work: approach.work,
+            dissipation: approach.work - gain,
+        }
+    }
+
+    /// Forces of the planes on the particles that touch them and do not leave, from all other
+    /// forces with the supports' in place: (slot, plane, force [N]).
+    pub(super) fn contact_forces(
+        &self,
+        force: &Array<3>,
+        (x, v): (&Array<3>, &Array<3>),
+        walls: &[WallState],
+        reference: &Reference,
+        now: (f64, f64),
+    ) -> Result<Vec<(usize, usize, [f64; 3])>> {
+        let volume = reference.volume.components()[0];
+        let touching = |slot: usize| TOUCHING * volume[slot].cbrt();
+        let found = self.within((x, v), walls, |_, _, slot| touching(slot));
+        let (mut sides, mut forces) = (Vec::new(), Vec::new());
+        for group in found.chunk_by(|a, b| a.0 == b.0) {
+            let slot = group[0].0;
+            sides.clear();
+            self.sides(group, &mut sides, volume[slot].cbrt());
+            let mass = self.density * volume[slot];
+            let acceleration = scale3(1.0 / mass, force.get(slot));
+            for side in &mut sides {
+                let wall = &self.walls[side.wall];
+                let leaving = dot(v.get(slot), wall.normal) - wall.velocity(now.0)?;
+                side.floor = if side.held || leaving * now.1 <= touching(slot) {
+                    let settled = dot(acceleration, sub3(wall.normal, side.direction));
+                    wall.acceleration(now)? - settled
+                } else {
+                    f64::NEG_INFINITY
+                };
+            }
+            push(acceleration, &mut sides);
+            for side in &sides {
+                forces.push((slot, side.wall, scale3(mass * side.push, side.direction)));
+            }
+        }
+        Ok(forces)
     }
 }

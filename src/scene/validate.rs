@@ -67,12 +67,27 @@ impl Scene {
                 ));
             }
             condition::validate(&path, condition).map_err(|e| e.at_boundary(name))?;
-            if let Some(key) = condition.heat() {
+            if let (None, Some(key)) = (&self.heat, condition.heat()) {
                 return Err(Error::scene(
                     format!("{path}.{key}"),
                     "a condition for heat needs the section `heat`, which switches heat on",
                 )
                 .at_boundary(name));
+            }
+        }
+        for (name, wall) in &self.contact {
+            let path = key("contact", name);
+            valid_name(&path, name)?;
+            condition::wall(&path, wall)?;
+            if let Some(patch) = &wall.patch
+                && !faces.contains(patch)
+                && !self.patches.contains_key(patch)
+            {
+                let known = self.patches.keys().chain(&faces);
+                return Err(Error::scene(
+                    format!("{path}.patch"),
+                    format!("there is no patch `{patch}`; there are {}", listed(known)),
+                ));
             }
         }
         Ok(())
