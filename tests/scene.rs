@@ -384,6 +384,25 @@ fn everything() -> Value {
     })
 }
 
+/// A material of a kind with every key.
+fn metal(kind: &str) -> Value {
+    let mut parameters = json!({"density": 8960, "youngs_modulus": 1.24e11, "poisson_ratio": 0.34});
+    let more = match kind {
+        "von_mises" => json!({
+            "yield_stress": 10, "hardening_modulus": 5, "saturation_stress": 20, "saturation_exponent": 3
+        }),
+        "johnson_cook" => json!({
+            "yield_stress": 9e7, "hardening_modulus": 2.92e8, "hardening_exponent": 0.31,
+            "rate_coefficient": 0.025, "reference_strain_rate": 1, "softening_exponent": 1.09,
+            "melting_temperature": 1356.2, "transition_temperature": 298.15
+        }),
+        _ => json!({}),
+    };
+    let all = parameters.as_object_mut().unwrap();
+    all.extend(more.as_object().unwrap().clone());
+    json!({ kind: parameters })
+}
+
 #[test]
 fn a_scene_survives_a_round_trip() {
     let full = Scene::from_json(&everything().to_string(), &[]).unwrap_or_else(|e| panic!("{e}"));
@@ -392,6 +411,13 @@ fn a_scene_survives_a_round_trip() {
         let text = serde_json::to_string(scene).unwrap();
         let again = Scene::from_json(&text, &[]).unwrap_or_else(|e| panic!("{}: {e}", scene.title));
         assert_eq!(*scene, again);
+    }
+    for kind in ["linear_elastic", "von_mises", "johnson_cook"] {
+        let mut scene = everything();
+        scene["material"] = metal(kind);
+        let scene = Scene::from_json(&scene.to_string(), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let text = serde_json::to_string(&scene).unwrap();
+        assert_eq!(scene, Scene::from_json(&text, &[]).unwrap());
     }
     let defaults = Scene::from_json(
         r#"{"geometry": {"box": {"min": [0,0,0], "max": [1,1,1], "spacing": 0.5}},
@@ -459,6 +485,19 @@ fn bad_values_are_refused_with_their_place() {
     let table = |time: &str, value: &str| {
         format!(r#"{TRACTION}={{"table": {{"time": {time}, "value": {value}}}}}"#)
     };
+    let changed = |kind: &str, key: &str, value: f64| {
+        let mut material = metal(kind);
+        material[kind][key] = json!(value);
+        format!("material={material}")
+    };
+    let linear = |key, value| changed("linear_elastic", key, value);
+    let steel = |key, value| changed("von_mises", key, value);
+    let copper = |key, value| changed("johnson_cook", key, value);
+    let without = |key| {
+        let mut material = metal("von_mises");
+        material["von_mises"].as_object_mut().unwrap().remove(key);
+        format!("material={material}")
+    };
     #[rustfmt::skip]
     let rows: &[(&str, Code, &str, &[&str])] = &[
         // Unknown and missing keys.
@@ -468,7 +507,7 @@ fn bad_values_are_refused_with_their_place() {
         ("time={}", P, "time", &["missing key `end`"]),
         ("geometry={}", P, "geometry", &["`box`, `boxes`"]),
         ("geometry.sphere={}", P, "geometry", &["only one of `box`, `boxes`", "`sphere`", "see the override"]),
-        ("material=steel", P, "material", &["unknown word `steel`", "`neo_hookean` or `mooney_rivlin`"]),
+        ("material=steel", P, "material", &["unknown word `steel`", "`neo_hookean`", "`johnson_cook`"]),
         ("boundary.top.suport=clamped", P, "boundary.top.suport", &["`support`, `velocity`, `traction`, `pressure`"]),
         ("boundary.leg.x_min.support=roller", P, "boundary.leg.x_min", &["unknown key `x_min`", "see the override"]),
         ("numerics.reference_update=always", P, "numerics.reference_update", &["`never`, `every_step`, `every`"]),
@@ -507,6 +546,23 @@ fn bad_values_are_refused_with_their_place() {
         ("material.neo_hookean.poisson_ratio=0.5", S, "material.neo_hookean.poisson_ratio", &["less than 0.5"]),
         ("material.neo_hookean.poisson_ratio=-1", S, "material.neo_hookean.poisson_ratio", &["more than -1"]),
         ("material={\"mooney_rivlin\": {\"density\": 1, \"youngs_modulus\": 1, \"poisson_ratio\": 0, \"area_share\": 1.5}}", S, "material.mooney_rivlin.area_share", &["from 0 to 1"]),
+        (&linear("poisson_ratio", 0.5), S, "material.linear_elastic.poisson_ratio", &["less than 0.5"]),
+        (&steel("yield_stress", 0.0), S, "material.von_mises.yield_stress", &["above 0 instead of 0"]),
+        (&steel("hardening_modulus", -1.0), S, "material.von_mises.hardening_modulus", &["0 or more, instead of -1"]),
+        (&steel("saturation_stress", 9.0), S, "material.von_mises.saturation_stress", &["not below `yield_stress`, 10, instead of 9"]),
+        (&steel("saturation_exponent", 0.0), S, "material.von_mises.saturation_exponent", &["above 0 instead of 0"]),
+        (&steel("hardness", 1.0), P, "material.von_mises.hardness", &["unknown key `hardness`", "`saturation_stress`"]),
+        (&without("saturation_stress"), S, "material.von_mises.saturation_exponent", &["needs `saturation_stress` too"]),
+        (&without("saturation_exponent"), S, "material.von_mises.saturation_stress", &["needs `saturation_exponent` too"]),
+        (&without("yield_stress"), P, "material.von_mises", &["missing key `yield_stress`"]),
+        (&copper("yield_stress", 0.0), S, "material.johnson_cook.yield_stress", &["above 0"]),
+        (&copper("hardening_exponent", 0.0), S, "material.johnson_cook.hardening_exponent", &["above 0"]),
+        (&copper("hardening_modulus", -1.0), S, "material.johnson_cook.hardening_modulus", &["0 or more"]),
+        (&copper("rate_coefficient", -0.1), S, "material.johnson_cook.rate_coefficient", &["0 or more"]),
+        (&copper("reference_strain_rate", 0.0), S, "material.johnson_cook.reference_strain_rate", &["above 0"]),
+        (&copper("softening_exponent", -1.0), S, "material.johnson_cook.softening_exponent", &["above 0"]),
+        (&copper("transition_temperature", 1356.2), S, "material.johnson_cook.transition_temperature", &["less than `melting_temperature`, 1356.2, instead of 1356.2"]),
+        (&copper("melting_temperature", 0.0), S, "material.johnson_cook.melting_temperature", &["above 0"]),
         // Geometry.
         ("geometry.box.spacing=0", S, "geometry.box.spacing", &["above 0"]),
         ("geometry.box.spacing=[0.5, -1, 0.5]", S, "geometry.box.spacing[1]", &["above 0"]),
@@ -568,7 +624,7 @@ fn bad_values_are_refused_with_their_place() {
         ("probes.top centre=[0, 6, 0]", S, "probes.top centre", &["is not a name"]),
         ("output.history_interval=0", S, "output.history_interval", &["above 0"]),
         ("output.field_interval=-1", S, "output.field_interval", &["above 0"]),
-        ("output.fields=[\"velocity\", \"temperature\"]", S, "output.fields[1]", &["no field `temperature`", "`cauchy_stress`"]),
+        ("output.fields=[\"velocity\", \"colour\"]", S, "output.fields[1]", &["no field `colour`", "`cauchy_stress`"]),
         ("output.fields=[\"velocity\", \"velocity\"]", S, "output.fields[1]", &["twice"]),
         // Overrides that have no place.
         ("time.end", A, "", &["`time.end`", "expected `path=value`"]),

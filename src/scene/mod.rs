@@ -26,7 +26,7 @@ pub use condition::{Condition, Convection, Initial, Support, Wall};
 pub use expression::Expression;
 pub use geometry::{AxisGrading, BoxGeometry, Geometry, Grading, Jitter, PatchSelection, Spacing};
 pub use heat::Heat;
-pub use material::{Material, MooneyRivlin, NeoHookean};
+pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
     Limiter, Neighbours, Numerics, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
 };
