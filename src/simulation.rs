@@ -469,7 +469,6 @@ impl Simulation {
                     url.rates.heat = Some(heat);
                     accounts.heat_in += share * url.heat_power(power?);
                 }
-                boundary.follow(approach, i, &url.rates.force, &state.v, dt);
                 url.advance_stage(state, start, reference, (stage.keep, stage.take), dt);
                 let next = SSP_RK3.get(i + 1).map_or(end, |next| time + next.time * dt);
                 boundary.constrain(&mut state.v, next, inputs)?;
@@ -491,7 +490,7 @@ impl Simulation {
             }
             // What the supports did: they held the constrained components against all forces.
             accounts.external_work += boundary.constrained_kinetic(&state.v) - held;
-            accounts.exchange(boundary.settle(approach, &state.v, walls));
+            accounts.exchange(boundary.settle(approach, walls));
             Ok(())
         })
     }
