@@ -1,7 +1,7 @@
 //! Rigid frictionless planes: particles touch them, slide along them and leave.
 #![allow(missing_docs)]
 
-use urlsph::{Energies, Field, Scene, Simulation};
+use urlsph::{Field, Scene, Simulation};
 
 fn simulation(json: &str, overrides: &[String]) -> Simulation {
     let scene = Scene::from_json(json, overrides).expect("a good scene");
