@@ -10,12 +10,17 @@ use urlsph::scene::{
 };
 use urlsph::{Code, Error};
 
-const EXAMPLES: [&str; 5] = [
+const EXAMPLES: [&str; 10] = [
     "column_tension",
     "column_bending",
     "column_twisting",
     "l_block",
     "elastic_cube",
+    "swinging_cube",
+    "thermo_wave",
+    "slab_heating",
+    "homogeneous",
+    "l_block_thermal",
 ];
 
 fn example_path(name: &str) -> PathBuf {
@@ -369,10 +374,19 @@ fn everything() -> Value {
             "leg.z_min": {"traction": {"table": {"time": [0, 1], "value": [[0, 0, 0], [1, 2, 3]]}}},
             "leg.z_max": {"traction": {"external": [1, 2, 3], "per_particle": true}, "support": "antisymmetry"},
             "base.z_min": {"velocity": {"external": [0, 0, 0]}},
-            "base.z_max": {"support": "clamped", "pressure": {"table": {"time": [0], "value": [1]}}}
+            "base.z_max": {"support": "clamped", "pressure": {"table": {"time": [0], "value": [1]}}},
+            "base.x_min": {"heat_flux": {"external": 10, "per_particle": true}},
+            "leg.x_max": {"heat_flux": "X*t", "convection": {
+                "coefficient": {"external": 25}, "ambient_temperature": {"table": {"time": [0, 1], "value": [293, 300]}}
+            }},
+            "leg.y_max": {"temperature": "293 + 5*t"}
+        },
+        "heat": {
+            "specific_heat": 400, "reference_temperature": 293, "conductivity": 50, "gruneisen_coefficient": 2,
+            "gruneisen_exponent": 0.5, "plastic_heat_fraction": 0.9, "source": "1e3*sin(t)"
         },
         "body_force": [0, "-9.81*1100", 0],
-        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0]},
+        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "temperature": "300 - X"},
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
@@ -663,6 +677,34 @@ fn bad_values_are_refused_with_their_place() {
             );
         }
     }
+}
+
+#[test]
+fn conditions_for_heat_need_heat() {
+    let heat = r#"heat={"specific_heat": 1, "reference_temperature": 293}"#;
+    for (key, value) in [
+        ("heat_flux", "1"),
+        ("temperature", "300"),
+        (
+            "convection",
+            r#"{"coefficient": 1, "ambient_temperature": 300}"#,
+        ),
+    ] {
+        let condition = format!("boundary.x_max.{key}={value}");
+        example("elastic_cube", &[heat, &condition]).unwrap_or_else(|e| panic!("{e}"));
+        let error = example("elastic_cube", &[&condition]).unwrap_err();
+        assert!(
+            error.to_string().contains("needs the section `heat`"),
+            "{error}"
+        );
+        let path = format!("boundary.x_max.{key}");
+        assert_eq!(error.place().path.as_deref(), Some(path.as_str()));
+    }
+    let error = example("elastic_cube", &["initial.temperature=300"]).unwrap_err();
+    assert!(
+        error.to_string().contains("add a section `heat`"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -69,8 +69,6 @@ pub struct Approach {
     sides: Vec<Side>,
     /// How far each plane moves [m].
     displacements: Vec<f64>,
-    /// What the planes did so far.
-    exchange: Exchange,
 }
 
 /// A particle near one plane or more.
@@ -80,6 +78,14 @@ struct Near {
     mass: f64,
     /// Its sides in [`Approach::sides`].
     sides: (usize, usize),
+    /// Projector onto the directions in which the planes can push it.
+    span: Mat3<f64>,
+    /// Kinetic energy along these directions at the step's start [J].
+    kinetic: f64,
+    /// Work of all other forces along these directions in this step [J].
+    work: f64,
+    /// Whether a plane pushed it in this step, and the work of the moving planes on it [J].
+    pushed: Option<f64>,
 }
 
 /// A particle and a plane.
@@ -88,9 +94,10 @@ struct Side {
     wall: usize,
     /// The plane's normal without what the particle's supports hold.
     direction: [f64; 3],
-    /// Distance that is left to where the plane is at the step's end, over the step: its gap and
-    /// sum w_i v_i . n of the stages so far [m/s].
+    /// Distance to where the plane is at the step's end, over the step [m/s].
     closing: f64,
+    /// sum w_i v_i . n of the stages so far [m/s].
+    travelled: f64,
     /// Whether the particle has to stay on the plane.
     held: bool,
     /// Velocity that the plane gives, in this stage [m/s].
@@ -256,12 +263,24 @@ impl Boundary {
     }
 
     /// Sides of one particle, without the planes that its supports keep it from following.
-    fn sides(&self, found: &[(usize, usize, f64)], sides: &mut Vec<Side>, size: f64) {
-        let free = self.free_directions(found[0].0);
+    fn sides(
+        &self,
+        found: &[(usize, usize, f64)],
+        sides: &mut Vec<Side>,
+        size: f64,
+    ) -> ((usize, usize), Mat3<f64>) {
+        let (first, free) = (sides.len(), self.free_directions(found[0].0));
+        let mut span = [[0.0; 3]; 3];
         for &(_, wall, gap) in found {
             let direction = mat_vec(&free, self.walls[wall].normal);
             if dot(direction, direction) < 1e-12 {
                 continue;
+            }
+            let rest = sub3(direction, mat_vec(&span, direction));
+            let norm = dot(rest, rest).sqrt();
+            if norm > 1e-6 {
+                let e = scale3(1.0 / norm, rest);
+                span = add_outer(&span, e, e);
             }
             let touches = gap.abs() <= TOUCHING * size;
             sides.push(Side {
@@ -272,11 +291,13 @@ impl Boundary {
                 } else {
                     gap
                 },
+                travelled: 0.0,
                 held: touches && !self.walls[wall].separation,
                 push: 0.0,
                 floor: 0.0,
             });
         }
+        ((first, sides.len()), span)
     }
 
     /// Stops what moves into a plane that it touches, at time 0; the energy lost.
@@ -343,7 +364,6 @@ impl Boundary {
     ) -> Result<()> {
         approach.near.clear();
         approach.sides.clear();
-        approach.exchange = Exchange::default();
         if self.walls.is_empty() {
             return Ok(());
         }
@@ -357,17 +377,20 @@ impl Boundary {
         let found = self.within((x, v), walls, reach);
         for group in found.chunk_by(|a, b| a.0 == b.0) {
             let slot = group[0].0;
-            let first = approach.sides.len();
-            self.sides(group, &mut approach.sides, volume[slot].cbrt());
-            let sides = (first, approach.sides.len());
-            for side in &mut approach.sides[first..] {
-                let travelled = SSP_RK3[0].weight * dot(v.get(slot), self.walls[side.wall].normal);
-                side.closing = (side.closing - displacements[side.wall]) / dt + travelled;
+            let (sides, span) = self.sides(group, &mut approach.sides, volume[slot].cbrt());
+            for side in &mut approach.sides[sides.0..sides.1] {
+                side.closing = (side.closing - displacements[side.wall]) / dt;
             }
+            let mass = self.density * volume[slot];
+            let along = mat_vec(&span, v.get(slot));
             approach.near.push(Near {
                 slot,
-                mass: self.density * volume[slot],
+                mass,
                 sides,
+                span,
+                kinetic: 0.5 * mass * dot(along, along),
+                work: 0.0,
+                pushed: None,
             });
         }
         Ok(())
@@ -383,9 +406,26 @@ impl Boundary {
         self.walls.iter().map(displacement).collect()
     }
 
+    /// Before stage `i`: what the other forces do, and how far the particles travel.
+    pub fn follow(
+        &self,
+        approach: &mut Approach,
+        i: usize,
+        force: &Array<3>,
+        v: &Array<3>,
+        dt: f64,
+    ) {
+        let weight = SSP_RK3[i].weight;
+        for near in &mut approach.near {
+            let v = v.get(near.slot);
+            near.work += weight * dt * dot(mat_vec(&near.span, force.get(near.slot)), v);
+            for side in &mut approach.sides[near.sides.0..near.sides.1] {
+                side.travelled += weight * dot(v, self.walls[side.wall].normal);
+            }
+        }
+    }
+
     /// After stage `i`, at time `t`: no particle moves so that the step would end behind a plane.
-    ///
-    /// What the pushes take out of the velocities is dissipated, but for the work of moving planes.
     pub fn keep_out(
         &self,
         approach: &mut Approach,
@@ -394,46 +434,54 @@ impl Boundary {
         walls: &mut [WallState],
         t: f64,
     ) -> Result<()> {
-        let carry = SSP_RK3[i].carry;
-        let next = SSP_RK3.get(i + 1).map_or(0.0, |stage| stage.weight);
         let to_come: f64 = SSP_RK3[i + 1..].iter().map(|s| s.weight).sum();
-        for near in &approach.near {
+        for near in &mut approach.near {
             let sides = &mut approach.sides[near.sides.0..near.sides.1];
             let old = v.get(near.slot);
             for side in &mut *sides {
                 let wall = &self.walls[side.wall];
+                let gap = side.closing + side.travelled;
                 let floor = if to_come > 0.0 {
-                    -side.closing / to_come
+                    -gap / to_come
                 } else {
                     // The next step starts from here: it must not arrive before its end.
-                    wall.velocity(t)? - side.closing.max(0.0)
+                    wall.velocity(t)? - gap.max(0.0)
                 };
                 // The part of the normal velocity that the supports hold is settled.
                 side.floor = floor - dot(old, sub3(wall.normal, side.direction));
             }
             let new = push(old, sides);
-            let mut work = 0.0;
-            for side in &mut *sides {
-                let wall = &self.walls[side.wall];
-                let impulse = carry * near.mass * side.push;
-                walls[side.wall].impulse += impulse;
-                work += impulse * wall.velocity(t)?;
-                side.closing += next * dot(new, wall.normal);
+            for side in &*sides {
+                if side.push != 0.0 {
+                    let impulse = SSP_RK3[i].carry * near.mass * side.push;
+                    let work = impulse * self.walls[side.wall].velocity(t)?;
+                    walls[side.wall].impulse += impulse;
+                    near.pushed = Some(near.pushed.unwrap_or(0.0) + work);
+                }
             }
-            let lost = 0.5 * carry * near.mass * (dot(old, old) - dot(new, new));
-            approach.exchange.work += work;
-            approach.exchange.dissipation += lost + work;
             v.set(near.slot, new);
         }
         Ok(())
     }
 
     /// At the step's end: the planes have moved; what they did to the energy.
-    pub fn settle(&self, approach: &Approach, walls: &mut [WallState]) -> Exchange {
+    ///
+    /// What a particle lost is what it has less than the work of all other forces and of moving
+    /// planes gave it. The quadrature of that work sees a release as a gain of higher order in the
+    /// step: contact cannot give energy, so that stays an error of integration.
+    pub fn settle(&self, approach: &Approach, v: &Array<3>, walls: &mut [WallState]) -> Exchange {
+        let mut exchange = Exchange::default();
+        for near in &approach.near {
+            let Some(work) = near.pushed else { continue };
+            let along = mat_vec(&near.span, v.get(near.slot));
+            let gain = 0.5 * near.mass * dot(along, along) - near.kinetic;
+            exchange.work += work;
+            exchange.dissipation += (work + near.work - gain).max(0.0);
+        }
         for (wall, displacement) in walls.iter_mut().zip(&approach.displacements) {
             wall.displacement += displacement;
         }
-        approach.exchange
+        exchange
     }
 
     /// Forces of the planes on the particles that touch them and do not leave, from all other

@@ -67,7 +67,9 @@ impl Scene {
                 ));
             }
             condition::validate(&path, condition).map_err(|e| e.at_boundary(name))?;
-            if let (None, Some(key)) = (&self.heat, condition.heat()) {
+            if self.heat.is_none()
+                && let Some(key) = condition.heat()
+            {
                 return Err(Error::scene(
                     format!("{path}.{key}"),
                     "a condition for heat needs the section `heat`, which switches heat on",
