@@ -54,7 +54,7 @@ struct Watch {
     released: f64,
     /// How often the number of touching particles changed.
     changes: usize,
-    /// Mean force up to a given time [N].
+    /// Mean force from the first touch to a given time, the first stop included [N].
     early_force: f64,
 }
 
@@ -67,7 +67,6 @@ fn watch(s: &mut Simulation, end: f64, early: f64) -> Watch {
         early_force: 0.0,
     };
     let (mut touching, mut dissipated) = (s.contact(0).particles, s.energies().contact_dissipation);
-    let first = s.contact(0).impulse[2];
     while s.time() < end {
         s.advance((s.time() + s.stable_step()).min(end))
             .expect("it runs");
@@ -86,7 +85,7 @@ fn watch(s: &mut Simulation, end: f64, early: f64) -> Watch {
             touching = contact.particles;
         }
         if s.time() < early {
-            watch.early_force = (contact.impulse[2] - first) / s.time();
+            watch.early_force = contact.impulse[2] / s.time();
         }
     }
     watch
@@ -120,7 +119,7 @@ fn a_bar_bounces() {
         within(
             "time of contact",
             w.released * c / 2.0 - 1.0,
-            0.2 * h + 0.003,
+            0.3 * h + 0.003,
         );
         within(
             "stress over rho c v",
@@ -250,7 +249,7 @@ fn a_block_bounces_obliquely() {
     println!("hits {hits:?}, {e:?}");
     assert!(hits[0] > 1 && hits[1] > 1);
     within("behind a plane", behind, 1e-12);
-    within("gain of a step / energy", least / energy, 1e-4);
+    within("gain of a step / energy", least / energy, 1e-15);
     let end = s.momenta().linear;
     let weight = [0.0, 0.0, -98100.0 * s.time()];
     for c in 0..3 {
@@ -375,10 +374,10 @@ fn bad_planes_are_refused() {
     }
 }
 
-/// The copper bar of [URL22] 8.3, coarse: the edge of the free face lifts off the plane, and the radius
-/// is the larger one of the reference, 7.350 mm to 7.203 mm, by as much.
+/// The copper bar of [URL22] 8.3 on 475 particles: free contact and rollers. The reference, 21.480 mm
+/// and 21.443 mm long, is approached from above; the free face spreads further.
 #[test]
-fn the_edge_of_the_copper_bar_lifts() {
+fn a_copper_bar_on_a_plane_and_on_rollers() {
     let bar = |more: &[&str]| {
         let json = r#"{
             "geometry": {"cylinder": {"radius": 3.2e-3, "length": 32.4e-3, "sector": "quarter", "divisions": 2, "layers": 24}},
@@ -389,37 +388,28 @@ fn the_edge_of_the_copper_bar_lifts() {
             "time": {"end": 80e-6}
         }"#;
         let mut s = simulation(json, more);
-        let started = std::time::Instant::now();
+        let initial = s.energies().kinetic + s.energies().contact_dissipation;
         s.advance(80e-6).expect("it runs");
         let x = field(&s, Field::Position);
         let bottom = &s.patches()[s.patch_index("bottom").expect("there")].particles;
-        let radius = |i: &usize| x[3 * i].hypot(x[3 * i + 1]);
-        let edge = *bottom
-            .iter()
-            .max_by(|a, b| radius(a).total_cmp(&radius(b)))
-            .expect("a face");
-        let length = x.chunks(3).map(|x| x[2]).fold(0.0, f64::max);
-        let lowest = x.chunks(3).map(|x| x[2]).fold(1.0, f64::min);
+        let over = |list: &mut dyn Iterator<Item = f64>| list.fold(0.0, f64::max);
+        let radius = 1e3 * over(&mut bottom.iter().map(|i| x[3 * i].hypot(x[3 * i + 1])));
+        let length = 1e3 * over(&mut x.chunks(3).map(|x| x[2]));
+        let lift = 1e3 * over(&mut bottom.iter().map(|i| x[3 * i + 2]));
         let e = s.energies();
-        println!(
-            "{} particles, {} steps, {:?}: radius {:.3} mm, length {:.3} mm, edge at {:.3} mm, lowest \
-             {lowest:e}, contact {:?}, {e:?}",
-            s.particle_count(),
-            s.steps(),
-            started.elapsed(),
-            1e3 * radius(&edge),
-            1e3 * length,
-            1e3 * x[3 * edge + 2],
-            s.contact(0)
+        println!("radius {radius:.3} mm, length {length:.3} mm, lift {lift:.1e} mm, {e:?}");
+        within(
+            "behind the plane",
+            over(&mut x.chunks(3).map(|x| -x[2])),
+            1e-18,
         );
-        (1e3 * radius(&edge), 1e3 * x[3 * edge + 2], 1e3 * length)
+        within("closure", e.closure_error / initial, 0.02);
+        (radius, length, lift)
     };
     let free = bar(&[]);
-    let roller = bar(&["contact.wall.separation=false", "contact.wall.patch=bottom"]);
-    assert!(free.1 > 0.1 && roller.1.abs() < 1e-9);
-    within(
-        "difference of the radii [mm]",
-        free.0 - roller.0 - 0.147,
-        0.1,
-    );
+    let rollers = bar(&["contact.wall.separation=false", "contact.wall.patch=bottom"]);
+    within("length, free", free.1 / 21.480 - 1.0, 0.02);
+    within("length, rollers", rollers.1 / 21.443 - 1.0, 0.02);
+    within("lift on rollers", rollers.2, 1e-12);
+    assert!(free.0 > rollers.0 && free.1 > rollers.1);
 }
