@@ -560,7 +560,7 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.reference_update=every", P, "numerics.reference_update.every", &["needs a value"]),
         ("numerics.reference_update=3", P, "numerics.reference_update", &["one of `never`"]),
         ("initial.gradient=exact", S, "initial.gradient", &["no initial displacement"]),
-        ("initial.gradient=analytic", P, "initial.gradient", &["`discrete`, `exact`"]),
+        ("initial.gradient=analytic", P, "initial.gradient", &["`discrete` or `exact`"]),
         // Wrong shapes.
         ("time=[3]", P, "time", &["a list, expected an object", "`end`"]),
         ("time.end=soon", P, "time.end", &["expected a number"]),
