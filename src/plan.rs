@@ -63,7 +63,11 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
             "Riemann dissipation D^p, linear reconstruction, Venkatakrishnan limiter"
         }
     };
-    feature(n.dissipation, dissipation.to_string());
+    let dissipation = match n.dissipation_coefficient {
+        1.0 => dissipation.to_string(),
+        coefficient => format!("{dissipation} (coefficient {coefficient})"),
+    };
+    feature(n.dissipation, dissipation);
     feature(
         n.state != StateMeasures::F,
         match n.state {

@@ -391,7 +391,7 @@ fn everything() -> Value {
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
-            "dissipation": true, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
+            "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
@@ -658,6 +658,8 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.smoothing_factor=2.1", S, "numerics.smoothing_factor", &["at most 2"]),
         ("numerics.kernel_option=0", S, "numerics.kernel_option", &["1, 2, 3 or 4"]),
         ("numerics.reference_update={\"every\": 0}", S, "numerics.reference_update.every", &["at least 1"]),
+        ("numerics.dissipation_coefficient=0", S, "numerics.dissipation_coefficient", &["more than 0"]),
+        ("numerics={\"dissipation\": false, \"dissipation_coefficient\": 0.5}", S, "numerics.dissipation_coefficient", &["switched off"]),
         ("numerics.volume_dissipation=0.1", S, "numerics.volume_dissipation", &["`fj` or `fhj`"]),
         ("numerics.volume_dissipation=-0.1", S, "numerics.volume_dissipation", &["0 or more"]),
         ("numerics={\"limiter\": \"minmod\", \"reconstruction\": \"none\"}", S, "numerics.limiter", &["to be `linear`"]),

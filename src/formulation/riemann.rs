@@ -51,17 +51,18 @@ pub struct Pair<T> {
 }
 
 /// Jump v_R - v_L at the middle of the pair; `grad_a` and `grad_b` are half the spatial velocity
-/// gradients of both sides.
+/// gradients of both sides. `full` is 1 over the dissipation coefficient, which a shock does without.
 #[inline(always)]
 pub fn jump<T: Lane, const MODE: u8>(
     pair: &Pair<T>,
     grad_a: &Mat3<T>,
     grad_b: &Mat3<T>,
+    full: T,
 ) -> Vec3<T> {
     let Pair { dx, dv, dx2, .. } = *pair;
     match MODE {
         CONSTANT => dv,
-        SHOCK => limiter::shock_jump(dv, dx, dx2, &add9(grad_a, grad_b)),
+        SHOCK => limiter::shock_jump(dv, dx, dx2, &add9(grad_a, grad_b), full),
         _ => {
             let (half_a, half_b) = (mat_vec(grad_a, dx), mat_vec(grad_b, dx));
             match MODE {

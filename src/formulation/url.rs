@@ -120,6 +120,7 @@ pub enum Trouble {
 #[derive(Debug, Clone, Copy)]
 struct Options {
     mode: u8,
+    coefficient: f64,
     venkatakrishnan: bool,
     volume_dissipation: f64,
     linear: bool,
@@ -217,6 +218,7 @@ impl Url {
             law,
             options: Options {
                 mode,
+                coefficient: numerics.dissipation_coefficient,
                 venkatakrishnan: numerics.limiter == Limiter::Venkatakrishnan,
                 volume_dissipation: numerics.volume_dissipation,
                 linear,
@@ -526,13 +528,14 @@ impl Url {
             rates,
             ..
         } = self;
+        let coefficient = options.coefficient;
         let input = ForceInput::new(state, reference, scratch);
         parallel::map_slabs(rates.force.slabs_mut(), |slab, out| {
             macro_rules! forces {
                 ($pairs:expr, $($mode:ident),*) => {
                     match options.mode {
                         $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
-                            pairs: $pairs, input, speeds, slab, out,
+                            pairs: $pairs, input, speeds, coefficient, slab, out,
                         }),)*
                         _ => unreachable!("five modes"),
                     }
