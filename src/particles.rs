@@ -18,6 +18,8 @@ pub struct Particles {
     pub positions: Vec<[f64; 3]>,
     /// V_R [m^3], initial.
     pub volumes: Vec<f64>,
+    /// Sum of A_R N [m^2], initial; zero inside the body.
+    pub surface: Vec<[f64; 3]>,
     /// Body's particle to caller's particle (lexicographic, X first, then Y, then Z).
     pub order: Vec<u32>,
     /// Caller's particle to body's particle.
@@ -327,6 +329,7 @@ impl Particles {
         let mut this = Self {
             positions: Vec::with_capacity(count),
             volumes: Vec::with_capacity(count),
+            surface: vec![[0.0; 3]; count],
             order: Vec::with_capacity(count),
             rank: vec![0; count],
             lattice,
@@ -355,6 +358,11 @@ impl Particles {
             }
         }
         let faces = boundary_faces(&this.lattice, &boxes);
+        for face in &faces {
+            for corner in face.corners {
+                this.surface[corner as usize][face.axis] += 0.25 * face.sign * face.area;
+            }
+        }
         this.patches = patches(&faces, &scene.patches)?;
         Ok(this)
     }

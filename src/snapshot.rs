@@ -24,7 +24,7 @@ pub struct Snapshot {
 
 const MAGIC: &[u8; 8] = b"URLSPHSN";
 /// Raised whenever the layout below changes.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Hash of everything that determines the meaning of a state: not of what a run writes, nor of how
 /// long it lasts.
@@ -114,11 +114,13 @@ impl Snapshot {
                 f_chi: Array::new(layout, identity()),
                 j_chi: Array::new(layout, [1.0]),
                 h_chi: None,
+                half_mu: None,
             });
             walk.array(&mut u.chi)?;
             walk.array(&mut u.f_chi)?;
             walk.array(&mut u.j_chi)?;
             walk.optional(&mut u.h_chi, layout)?;
+            walk.optional(&mut u.half_mu, layout)?;
         }
         Ok(())
     }

@@ -109,7 +109,7 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
             let own = load3::<T>(token, &self.field, a);
             let mut sum = [zero3(token); 3];
             for (b, pair) in self.reference.slices.of(a) {
-                let (g, _) = self.pairs.pair(centre, b, pair);
+                let (g, _) = self.pairs.pair(token, &centre, b, pair);
                 sum = add_outer(&sum, sub3(load3(token, &self.field, b), own), g);
             }
             store9(&mat_mul_t(&sum, &load9(token, &l, a)), self.out, at);
@@ -418,7 +418,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             let mut work = T::splat(token, 0.0);
             let mut length2 = far;
             for (b, pair) in slices.of(a) {
-                let (g, back) = pairs.pair(centre, b, pair);
+                let (g, back) = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
                 let mask = T::load(token, weights, pair);
                 length2 = length2.min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
@@ -467,7 +467,7 @@ impl<P: PairVectors> Work for HalfSlope<'_, P> {
             let own = T::load(token, self.sigma, a);
             let mut sum = zero3(token);
             for (b, pair) in self.reference.slices.of(a) {
-                let (g, _) = self.pairs.pair(centre, b, pair);
+                let (g, _) = self.pairs.pair(token, &centre, b, pair);
                 sum = axpy3(sum, T::load(token, self.sigma, b) - own, g);
             }
             let f = load9::<T>(token, &self.kinematics.f, a);
@@ -513,7 +513,7 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
             );
             let (mut rate, mut work) = (T::splat(token, 0.0), T::splat(token, 0.0));
             for (b, pair) in input.reference.slices.of(a) {
-                let (g, back) = pairs.pair(centre, b, pair);
+                let (g, back) = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
                 p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(token, &input.s, b), back));
                 let difference = T::load(token, self.sigma, b) - sigma_a;

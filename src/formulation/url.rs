@@ -481,7 +481,7 @@ impl Url {
         }
         new.chi.copy_from(&state.x);
         reference.updated = Some(new);
-        if let Err(slot) = reference.rebuild() {
+        if let Err(slot) = reference.update() {
             reference.updated = Some(old);
             reference.rebuild().expect("it could be built before");
             let jacobian = self.deformation(state, reference, slot).j;

@@ -26,7 +26,7 @@ pub use expression::Expression;
 pub use geometry::{BoxGeometry, Geometry, PatchSelection, Spacing};
 pub use material::{Material, MooneyRivlin, NeoHookean};
 pub use numerics::{
-    Limiter, Neighbours, Numerics, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
+    Limiter, Neighbours, Numerics, Operators, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
 };
 pub use schema::json_schema;
 pub use value::{Interpolation, Scalar, ScalarFunction, Table, Vector, VectorFunction};

@@ -15,6 +15,10 @@ use crate::error::Result;
 pub struct Numerics {
     /// Neighbours of a particle.
     pub neighbours: Neighbours,
+    /// What gradients and forces are made of; default `kernel` where the particles form a lattice,
+    /// or where `weights` are `tributary`, and `repaired` elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operators: Option<Operators>,
     /// Weights inside the kernel gradient.
     pub weights: Weights,
     /// Smoothing factor f_h: h_b = f_h x largest distance to a neighbour ([URL22] 37).
@@ -48,6 +52,7 @@ impl Default for Numerics {
     fn default() -> Self {
         Self {
             neighbours: Neighbours::Lattice(18),
+            operators: None,
             weights: Weights::Unit,
             smoothing_factor: 0.6,
             kernel_option: 1,
@@ -83,6 +88,19 @@ pub enum Neighbours {
         /// Radius over spacing.
         radius: f64,
     },
+}
+
+/// What gradients and forces are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Operators {
+    /// Corrected kernel gradients ([URL22] 42, 58): closed on a lattice.
+    Kernel,
+    /// Corrected kernel gradients with the smallest change that makes a uniform stress force-free on
+    /// any particles.
+    Repaired,
+    /// Gradients of the shape functions of the mesh: exact too, without a kernel.
+    Mesh,
 }
 
 /// Weights inside the kernel gradient.
@@ -186,6 +204,11 @@ pub(super) fn validate(n: &Numerics) -> Result<()> {
             ),
         )?,
     }
+    require(
+        n.weights == Weights::Unit || matches!(n.operators, None | Some(Operators::Kernel)),
+        "numerics.weights",
+        "tributary weights belong to the operators `kernel`",
+    )?;
     require(
         n.smoothing_factor > 0.5 && n.smoothing_factor <= 2.0,
         "numerics.smoothing_factor",
