@@ -5,6 +5,7 @@ use serde_json::Value;
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::FmiVersion;
+use crate::boundary::Quantity;
 use crate::error::{Code, Error, Result};
 use crate::output::variables::{self, OutputVariable, element_name, name_part};
 use crate::scene::{Scene, StateMeasures};
@@ -252,13 +253,23 @@ impl Table {
             let patch = &simulation.patches()[input.patch];
             let rows = (input.per_particle && detailed.contains(&input.patch))
                 .then_some(patch.particles.len());
-            // The mean of what the body does has the plain name `velocity`.
+            // The means of what the body does have the plain names `velocity` and `temperature`.
             let (name, text) = match input.quantity {
-                crate::Quantity::Velocity => ("prescribed_velocity", "Prescribed velocity"),
-                crate::Quantity::Traction => ("traction", "Dead traction per unit initial area"),
-                crate::Quantity::Pressure => {
-                    ("pressure", "Follower pressure per unit current area")
+                Quantity::Velocity => ("prescribed_velocity", "Prescribed velocity"),
+                Quantity::Traction => ("traction", "Dead traction per unit initial area"),
+                Quantity::Pressure => ("pressure", "Follower pressure per unit current area"),
+                Quantity::HeatFlux => {
+                    ("heat_flux", "Heat flux into the body per unit initial area")
                 }
+                Quantity::Temperature => ("prescribed_temperature", "Prescribed temperature"),
+                Quantity::ConvectionCoefficient => (
+                    "convection_coefficient",
+                    "Heat transfer coefficient per unit initial area",
+                ),
+                Quantity::AmbientTemperature => (
+                    "ambient_temperature",
+                    "Temperature of the surroundings for the convection",
+                ),
             };
             list.push(Variable {
                 name: format!("boundary.{}.{name}", name_part(&patch.name)),

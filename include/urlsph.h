@@ -153,6 +153,14 @@ enum urlsph_quantity
     URLSPH_PRESSURE = 2,
     // Prescribed velocity [m/s], 3 components.
     URLSPH_VELOCITY = 3,
+    // Heat flux into the body per unit initial area [W/m^2], 1 component.
+    URLSPH_HEAT_FLUX = 4,
+    // Prescribed absolute temperature [K], 1 component.
+    URLSPH_TEMPERATURE = 5,
+    // Heat transfer coefficient of the convection per unit initial area [W/(m^2 K)], 1 component.
+    URLSPH_CONVECTION_COEFFICIENT = 6,
+    // Absolute temperature of the surroundings that the convection leads to [K], 1 component.
+    URLSPH_AMBIENT_TEMPERATURE = 7,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -44,6 +44,12 @@ pub enum Field {
     InitialVolume,
     /// Resultant of internal forces, loads and supports per particle.
     NodalForce,
+    /// Absolute temperature theta; only with heat.
+    Temperature,
+    /// Entropy per unit initial volume eta; only with heat.
+    Entropy,
+    /// Equivalent plastic strain; only of a law with plasticity.
+    EquivalentPlasticStrain,
 }
 
 /// Description of one field.
@@ -88,6 +94,9 @@ fields! {
     Density "density" "kg/m^3" 1 Current "Current density, rho_R / J";
     InitialVolume "initial_volume" "m^3" 1 Initial "Tributary volume in the initial configuration";
     NodalForce "nodal_force" "N" 3 Current "Sum of internal forces, loads and support reactions on a particle";
+    Temperature "temperature" "K" 1 Current "Absolute temperature; only with heat";
+    Entropy "entropy" "J/(m^3.K)" 1 Initial "Entropy per unit initial volume; only with heat";
+    EquivalentPlasticStrain "equivalent_plastic_strain" "1" 1 Current "Equivalent plastic strain; only of a material with plasticity";
 }
 
 // `Field::info` looks a field up by its number.

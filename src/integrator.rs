@@ -11,6 +11,8 @@ pub struct Stage {
     pub time: f64,
     /// Weight of these rates in the whole step: y^{n+1} = y^n + dt sum weight k.
     pub weight: f64,
+    /// Share of a change made to the state after this stage that reaches the step's end.
+    pub carry: f64,
 }
 
 /// Three-stage strong-stability-preserving Runge-Kutta ([URL22] 61).
@@ -20,18 +22,21 @@ pub const SSP_RK3: [Stage; 3] = [
         take: 1.0,
         time: 0.0,
         weight: 1.0 / 6.0,
+        carry: 1.0 / 6.0,
     },
     Stage {
         keep: 0.75,
         take: 0.25,
         time: 1.0,
         weight: 1.0 / 6.0,
+        carry: 2.0 / 3.0,
     },
     Stage {
         keep: 1.0 / 3.0,
         take: 2.0 / 3.0,
         time: 0.5,
         weight: 2.0 / 3.0,
+        carry: 1.0,
     },
 ];
 

@@ -49,8 +49,11 @@ pub trait Lane:
     fn store(self, to: &mut [f64], at: usize);
     /// Calls `each(lane, value)` in the order of the lanes.
     fn for_lanes(self, each: impl FnMut(usize, f64));
-    /// First guess of `self^(-1/3)` for positive values, within 4 %.
-    fn inverse_cbrt_guess(self) -> Self;
+    /// Whether `self > 0` in any lane: to leave out work that no lane needs, never to choose how a
+    /// lane's own value comes about.
+    fn any_positive(self) -> bool;
+    /// The values whose bit patterns are `each(bits)`.
+    fn map_bits(self, each: impl Fn(u64) -> u64) -> Self;
 
     /// The same in every lane, in the company of this value.
     #[inline(always)]
@@ -61,21 +64,139 @@ pub trait Lane:
     /// `self^(-1/3)` for positive values: Newton's iteration for y^-3 = x.
     #[inline(always)]
     fn inverse_cbrt(self) -> Self {
-        let mut y = self.inverse_cbrt_guess();
+        let mut y = self.map_bits(inverse_cbrt_guess);
         for _ in 0..4 {
             let residual = self.of(1.0) - self * y * (y * y);
             y = (y * self.of(1.0 / 3.0)).mul_add(residual, y);
         }
         y
     }
+
+    /// Natural logarithm within 1 ulp: fdlibm's e_log.c. Minus infinity at 0, NaN below it.
+    #[inline(always)]
+    fn ln(self) -> Self {
+        let (zero, infinity) = (self.of(0.0), self.of(f64::INFINITY));
+        // Subnormal numbers have no exponent of their own: lend them 2^54.
+        let subnormal = self.of(f64::MIN_POSITIVE) - self;
+        let x = subnormal.if_positive(self * self.of(TWO_54), self);
+        let lent = subnormal.if_positive(self.of(54.0), zero);
+        // x = 2^k m, m in [sqrt(1/2), sqrt(2)).
+        let m = x.map_bits(mantissa_around_one);
+        let k = x.map_bits(exponent_around_one) - self.of(EXPONENT_OFFSET) - lent;
+        // ln(1 + f) = f - f^2/2 + s (f^2/2 + R(s^2)), s = f/(2 + f).
+        let f = m - self.of(1.0);
+        let s = f / (self.of(2.0) + f);
+        let (z, half_f2) = (s * s, self.of(0.5) * f * f);
+        let mut r = self.of(LN[6]);
+        for c in LN[..6].iter().rev() {
+            r = r.mul_add(z, self.of(*c));
+        }
+        let small = s.mul_add(r.mul_add(z, half_f2), k * self.of(LN_2_LOW)) - half_f2 + f;
+        let finite = k.mul_add(self.of(LN_2_HIGH), small);
+        // self - infinity: minus infinity at 0, NaN at NaN.
+        self.if_positive(
+            (infinity - self).if_positive(finite, self),
+            (-self).if_positive(self.of(f64::NAN), self - infinity),
+        )
+    }
+
+    /// Exponential function within 1 ulp; 0 and infinity where it under- and overflows.
+    #[inline(always)]
+    fn exp(self) -> Self {
+        // This order of the operands keeps NaN.
+        let x = self.of(-746.0).max(self.of(710.0).min(self));
+        let n = (x * self.of(std::f64::consts::LOG2_E)).round();
+        let r = (-n).mul_add(self.of(LN_2_LOW), (-n).mul_add(self.of(LN_2_HIGH), x));
+        // |r| <= ln(2)/2: the remainder of the Taylor series is 4e-18.
+        let mut p = self.of(INVERSE_FACTORIALS[13]);
+        for c in INVERSE_FACTORIALS[2..13].iter().rev() {
+            p = p.mul_add(r, self.of(*c));
+        }
+        let e = (r * r).mul_add(p, r) + self.of(1.0);
+        // In two steps, because 2^n alone may be out of range.
+        let half = (n * self.of(0.5)).round();
+        e * half.power_of_two() * (n - half).power_of_two()
+    }
+
+    /// `self^y` for `self >= 0` and `y > 0`, with a relative error of `|y ln(self)|` units more than
+    /// those of [`exp`](Self::exp): 0 at 0 and exactly 1 at 1.
+    #[inline(always)]
+    fn powf(self, y: f64) -> Self {
+        (self.ln() * self.of(y)).exp()
+    }
+
+    /// Nearest integer, for magnitudes below 2^51.
+    #[inline(always)]
+    fn round(self) -> Self {
+        (self + self.of(INTEGER_BITS)) - self.of(INTEGER_BITS)
+    }
+
+    /// 2^self for integers from -1022 to 1023.
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        (self + self.of(INTEGER_BITS)).map_bits(exponent_from_integer)
+    }
 }
 
-/// Guess by a third of the exponent; the constant balances the error over one octave of three.
+/// 2^54.
+const TWO_54: f64 = (1_u64 << 54) as f64;
+/// 1.5 * 2^52: what is added to it is rounded to an integer, which its lowest bits then hold.
+const INTEGER_BITS: f64 = 6_755_399_441_055_744.0;
+/// 2^52 + 1023: see [`exponent_around_one`].
+const EXPONENT_OFFSET: f64 = 4_503_599_627_371_519.0;
+/// ln(2) in two parts; the first has 20 trailing zero bits, so its product with an exponent is exact.
+const LN_2_HIGH: f64 = 6.931_471_803_691_238_164_90e-1;
+const LN_2_LOW: f64 = 1.908_214_929_270_587_700_02e-10;
+/// Coefficients of R(s^2)/s^2 in fdlibm's e_log.c.
+const LN: [f64; 7] = [
+    6.666_666_666_666_735_130e-1,
+    3.999_999_999_940_941_908e-1,
+    2.857_142_874_366_239_149e-1,
+    2.222_219_843_214_978_396e-1,
+    1.818_357_216_161_805_012e-1,
+    1.531_383_769_920_937_332e-1,
+    1.479_819_860_511_658_591e-1,
+];
+/// 1/k!.
+pub const INVERSE_FACTORIALS: [f64; 14] = {
+    let mut table = [1.0; 14];
+    let (mut k, mut factorial) = (1, 1.0);
+    while k < 14 {
+        factorial *= k as f64;
+        table[k] = 1.0 / factorial;
+        k += 1;
+    }
+    table
+};
+
+/// High word of sqrt(1/2), where the mantissas of [`Lane::ln`] begin.
+const ROOT_HALF: u64 = 0x3FE6_A09E << 32;
+const ONE: u64 = 0x3FF0_0000 << 32;
+const MANTISSA: u64 = (1 << 52) - 1;
+
+/// m of x = 2^k m.
 #[inline(always)]
-fn inverse_cbrt_guess(x: f64) -> f64 {
-    let high = x.to_bits() >> 32;
-    let third = (high.wrapping_mul(0x5555_5556)) >> 32;
-    f64::from_bits(0x553E_F0FF_u64.wrapping_sub(third) << 32)
+fn mantissa_around_one(bits: u64) -> u64 {
+    (bits.wrapping_add(ONE - ROOT_HALF) & MANTISSA) + ROOT_HALF
+}
+
+/// 2^52 + 1023 + k of x = 2^k m.
+#[inline(always)]
+fn exponent_around_one(bits: u64) -> u64 {
+    (bits.wrapping_add(ONE - ROOT_HALF) >> 52) | (0x433 << 52)
+}
+
+/// 2^n from 1.5 * 2^52 + n.
+#[inline(always)]
+fn exponent_from_integer(bits: u64) -> u64 {
+    bits.wrapping_add(1023) << 52
+}
+
+/// Guess within 4 % by a third of the exponent; the constant balances the error over one octave of three.
+#[inline(always)]
+fn inverse_cbrt_guess(bits: u64) -> u64 {
+    let third = (bits >> 32).wrapping_mul(0x5555_5556) >> 32;
+    0x553E_F0FF_u64.wrapping_sub(third) << 32
 }
 
 impl Lane for f64 {
@@ -120,8 +241,12 @@ impl Lane for f64 {
         each(0, self);
     }
     #[inline(always)]
-    fn inverse_cbrt_guess(self) -> Self {
-        inverse_cbrt_guess(self)
+    fn any_positive(self) -> bool {
+        self > 0.0
+    }
+    #[inline(always)]
+    fn map_bits(self, each: impl Fn(u64) -> u64) -> Self {
+        f64::from_bits(each(self.to_bits()))
     }
 }
 
@@ -236,13 +361,19 @@ impl<S: Simd> Lane for Wide<S> {
         }
     }
     #[inline(always)]
-    fn inverse_cbrt_guess(self) -> Self {
-        let mut guess = self;
-        let values: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut guess.value));
-        for value in values {
-            *value = inverse_cbrt_guess(*value);
+    fn any_positive(self) -> bool {
+        let zero = self.simd.splat_f64s(0.0);
+        let mask = self.simd.greater_than_f64s(self.value, zero);
+        self.simd.first_true_m64s(mask) < Self::WIDTH
+    }
+    #[inline(always)]
+    fn map_bits(self, each: impl Fn(u64) -> u64) -> Self {
+        let mut mapped = self;
+        let all: &mut [u64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut mapped.value));
+        for bits in all {
+            *bits = each(*bits);
         }
-        guess
+        mapped
     }
 }
 
@@ -322,15 +453,58 @@ pub fn on_avx2<W: Work>(work: W) -> Option<W::Output> {
 mod tests {
     use super::*;
 
-    struct CubeRoots<'a>(&'a [f64], &'a mut [f64]);
-    impl Work for CubeRoots<'_> {
+    #[derive(Clone, Copy)]
+    enum Function {
+        InverseCubeRoot,
+        Ln,
+        Exp,
+        Power(f64),
+    }
+    struct Apply<'a>(Function, &'a [f64], &'a mut [f64]);
+    impl Work for Apply<'_> {
         type Output = ();
         #[inline(always)]
         fn run<T: Lane>(self, token: T::Token) {
-            for at in (0..self.0.len()).step_by(T::WIDTH) {
-                T::load(token, self.0, at).inverse_cbrt().store(self.1, at);
+            for at in (0..self.1.len()).step_by(T::WIDTH) {
+                let x = T::load(token, self.1, at);
+                let y = match self.0 {
+                    Function::InverseCubeRoot => x.inverse_cbrt(),
+                    Function::Ln => x.ln(),
+                    Function::Exp => x.exp(),
+                    Function::Power(y) => x.powf(y),
+                };
+                y.store(self.2, at);
             }
         }
+    }
+
+    /// The function of one lane after seeing that all widths give its bits.
+    fn in_every_width(function: Function, x: &[f64]) -> Vec<f64> {
+        assert_eq!(x.len() % SLICE, 0);
+        let [mut single, mut wide, mut avx2] = [(); 3].map(|()| vec![0.0; x.len()]);
+        Apply(function, x, &mut single).run::<f64>(());
+        vectorised(Apply(function, x, &mut wide));
+        let same = |a: &[f64]| {
+            for (i, (a, b)) in a.iter().zip(&single).enumerate() {
+                let both_nan = a.is_nan() && b.is_nan();
+                assert!(both_nan || a.to_bits() == b.to_bits(), "{}: {a} {b}", x[i]);
+            }
+        };
+        same(&wide);
+        #[cfg(target_arch = "x86_64")]
+        if on_avx2(Apply(function, x, &mut avx2)).is_some() {
+            same(&avx2);
+        }
+        single
+    }
+
+    /// Largest difference in units of the last place of `exact`.
+    fn ulps(ours: &[f64], exact: impl Iterator<Item = f64>) -> f64 {
+        let ulp = |y: f64| f64::from_bits(y.abs().to_bits() + 1) - y.abs();
+        ours.iter()
+            .zip(exact)
+            .map(|(y, e)| (y - e).abs() / ulp(e))
+            .fold(0.0, f64::max)
     }
 
     #[test]
@@ -338,15 +512,91 @@ mod tests {
         let x: Vec<f64> = (0..4000)
             .map(|i| 10f64.powf(-6.0 + f64::from(i) * 0.003))
             .collect();
-        let (mut wide, mut single) = (vec![0.0; x.len()], vec![0.0; x.len()]);
-        vectorised(CubeRoots(&x, &mut wide));
-        CubeRoots(&x, &mut single).run::<f64>(());
-        let mut worst: f64 = 0.0;
-        for (i, x) in x.iter().enumerate() {
-            worst = worst.max((wide[i] * x.cbrt() - 1.0).abs());
-            assert_eq!(wide[i].to_bits(), single[i].to_bits());
-        }
+        let ours = in_every_width(Function::InverseCubeRoot, &x);
+        let worst = ours
+            .iter()
+            .zip(&x)
+            .map(|(y, x)| (y * x.cbrt() - 1.0).abs())
+            .fold(0.0, f64::max);
         println!("relative error {worst:e} (tolerance 1e-15)");
         assert!(worst < 1e-15);
+    }
+
+    #[test]
+    fn logarithm_is_accurate_and_the_same_in_every_width() {
+        let mut x: Vec<f64> = (0..8000)
+            .map(|i| 10f64.powf(-300.0 + f64::from(i) * 0.075))
+            .collect();
+        x.extend((-4000..4000).map(|i| 1.0 + f64::from(i) * 1e-4));
+        x.extend((-4000..4000).map(|i| 1.0 + f64::from(i) * 1e-13));
+        x.extend((0..8).map(|i| f64::from_bits(1 << (6 * i))));
+        let worst = ulps(&in_every_width(Function::Ln, &x), x.iter().map(|x| x.ln()));
+        println!("error of ln {worst} ulp (tolerance 1.5)");
+        assert!(worst <= 1.5);
+        let odd = [
+            0.0,
+            -0.0,
+            1.0,
+            f64::INFINITY,
+            -1.0,
+            f64::NEG_INFINITY,
+            f64::NAN,
+            f64::MAX,
+        ];
+        let y = in_every_width(Function::Ln, &odd);
+        assert_eq!(
+            y[..4],
+            [f64::NEG_INFINITY, f64::NEG_INFINITY, 0.0, f64::INFINITY]
+        );
+        assert!(y[4..7].iter().all(|y| y.is_nan()));
+        assert!((y[7] - f64::MAX.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn exponential_is_accurate_and_the_same_in_every_width() {
+        let mut x: Vec<f64> = (0..8000).map(|i| -745.0 + f64::from(i) * 0.1818).collect();
+        x.extend((-4000..4000).map(|i| f64::from(i) * 5e-4));
+        x.extend((-4000..4000).map(|i| f64::from(i) * 1e-13));
+        let worst = ulps(
+            &in_every_width(Function::Exp, &x),
+            x.iter().map(|x| x.exp()),
+        );
+        println!("error of exp {worst} ulp (tolerance 1.5)");
+        assert!(worst <= 1.5);
+        let infinity = f64::INFINITY;
+        let odd = [
+            0.0,
+            -0.0,
+            infinity,
+            710.0,
+            -infinity,
+            -746.0,
+            1e300,
+            f64::NAN,
+        ];
+        let y = in_every_width(Function::Exp, &odd);
+        assert_eq!(y[..7], [1.0, 1.0, infinity, infinity, 0.0, 0.0, infinity]);
+        assert!(y[7].is_nan());
+    }
+
+    #[test]
+    fn powers_are_accurate_and_the_same_in_every_width() {
+        for power in [0.05, 0.31, 1.0, 1.09, 2.5] {
+            let mut x: Vec<f64> = (0..4000)
+                .map(|i| 10f64.powf(-12.0 + f64::from(i) * 0.0035))
+                .collect();
+            x[..8].copy_from_slice(&[0.0, 1.0, f64::MIN_POSITIVE, 5e-324, 0.5, 2.0, 0.999, 1e-300]);
+            let ours = in_every_width(Function::Power(power), &x);
+            assert_eq!(ours[..2], [0.0, 1.0]);
+            let mut worst: f64 = 0.0;
+            for (y, x) in ours[1..].iter().zip(&x[1..]) {
+                // A last unit for each of |power ln x|, and two of exp and pow.
+                let units = 2.0 + (power * x.ln()).abs();
+                worst =
+                    worst.max((y - x.powf(power)).abs() / (x.powf(power) * units * f64::EPSILON));
+            }
+            println!("error of x^{power} over its bound: {worst} (tolerance 1)");
+            assert!(worst < 1.0);
+        }
     }
 }

@@ -149,6 +149,10 @@ impl<const N: usize> Array<N> {
             })
             .collect()
     }
+    /// Sets every slot, guards included.
+    pub fn fill(&mut self, value: f64) {
+        self.data.fill(Slots([value; SLICE]));
+    }
     /// Copies an array of the same layout.
     pub fn copy_from(&mut self, other: &Self) {
         self.data.copy_from_slice(&other.data);

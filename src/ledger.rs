@@ -1,20 +1,37 @@
 //! The ledger: what energy came in, what is stored, what was dissipated and by whom; momenta.
 
-/// Energies [J]. Works and dissipations are accumulated since time 0 with the weights of the time
-/// integrator.
+use crate::formulation::url::{Evaluation, Plastic};
+
+/// Energies [J] and entropies [J/K]. Works, heats and dissipations are accumulated since time 0 with
+/// the weights of the time integrator. What a scene does not have is 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Energies {
     /// Kinetic energy, sum of m v.v / 2.
     pub kinetic: f64,
-    /// Strain energy, sum of V W.
+    /// Strain energy, sum of V W; with heat the mechanical part of the internal energy ([URL23] 27, 35).
     pub strain: f64,
+    /// Thermal part of the internal energy, sum of V c_v (theta - theta_R) ([URL23] 20).
+    pub thermal: f64,
     /// Work of tractions, pressures, body force and moving supports since time 0.
     pub external_work: f64,
+    /// Heat from sources, heat fluxes, convection and prescribed temperatures since time 0.
+    pub heat_in: f64,
+    /// Plastic work since time 0. With heat its part that becomes heat is in `thermal` as well.
+    pub plastic_work: f64,
     /// Energy dissipated by the scheme since time 0, from the dissipation terms themselves.
     pub numerical_dissipation: f64,
     /// Energy taken out by the angular-momentum projection since time 0 (of either sign).
     pub projection: f64,
-    /// kinetic + strain + numerical_dissipation + projection - external_work - initial energy.
+    /// Ballistic energy, kinetic + strain + thermal - theta_R entropy ([URL23] 45): without supply
+    /// from outside it never rises.
+    pub ballistic: f64,
+    /// Entropy, sum of V eta [J/K].
+    pub entropy: f64,
+    /// Entropy produced by conduction and plastic flow since time 0 [J/K]: never falls.
+    pub entropy_production: f64,
+    /// What is stored and dissipated less what was supplied and the initial energy: kinetic + strain +
+    /// thermal + plastic work that did not become heat + numerical_dissipation + projection
+    /// - external_work - heat_in - initial energy.
     pub closure_error: f64,
 }
 
@@ -40,11 +57,29 @@ pub struct Resultant {
     pub mean_velocity: [f64; 3],
 }
 
+/// Heat through a patch and its temperature; areas of the initial configuration.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct HeatResultant {
+    /// Heat that flows into the body through this patch [W]: flux, convection, and what a
+    /// prescribed temperature draws.
+    pub heat_flow: f64,
+    /// Area-weighted mean temperature [K].
+    pub mean_temperature: f64,
+    /// Highest temperature of its particles [K].
+    pub maximum_temperature: f64,
+}
+
 /// Running totals since time 0: part of the state.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Accounts {
     /// Energy at time 0 [J].
     pub initial: f64,
+    /// See [`Energies::heat_in`].
+    pub heat_in: f64,
+    /// What plastic flow did.
+    pub plastic: Plastic,
+    /// Entropy that conduction produced [J/K].
+    pub conduction: f64,
     /// See [`Energies::external_work`].
     pub external_work: f64,
     /// See [`Energies::numerical_dissipation`].
@@ -55,16 +90,22 @@ pub(crate) struct Accounts {
 
 impl Accounts {
     /// The ledger with what is stored now.
-    pub fn energies(&self, kinetic: f64, strain: f64) -> Energies {
+    pub fn energies(&self, now: &Evaluation, reference_temperature: f64) -> Energies {
+        let stored = now.kinetic + now.strain + now.thermal;
+        let lost = self.plastic.work - self.plastic.heat + self.dissipation + self.projection;
         Energies {
-            kinetic,
-            strain,
+            kinetic: now.kinetic,
+            strain: now.strain,
+            thermal: now.thermal,
             external_work: self.external_work,
+            heat_in: self.heat_in,
+            plastic_work: self.plastic.work,
             numerical_dissipation: self.dissipation,
             projection: self.projection,
-            closure_error: kinetic + strain + self.dissipation + self.projection
-                - self.external_work
-                - self.initial,
+            ballistic: stored - reference_temperature * now.entropy,
+            entropy: now.entropy,
+            entropy_production: self.conduction + self.plastic.entropy,
+            closure_error: stored + lost - self.external_work - self.heat_in - self.initial,
         }
     }
 }

@@ -61,7 +61,7 @@ mod snapshot;
 pub use boundary::{Input, Patch, Quantity};
 pub use error::{Code, Error, Result};
 pub use fields::{Configuration, FIELDS, Field, FieldInfo};
-pub use ledger::{Energies, Momenta, Resultant};
+pub use ledger::{Energies, HeatResultant, Momenta, Resultant};
 pub use plan::Plan;
 pub use scene::Scene;
 pub use simulation::{Control, ProbeMotion, Progress, Simulation, View};

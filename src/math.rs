@@ -31,6 +31,12 @@ pub fn flat(m: &Mat3<f64>) -> [f64; 9] {
     [a, b, c, d, e, f, g, h, i]
 }
 
+/// The matrix of row-major components.
+pub fn matrix(m: &[f64; 9]) -> Mat3<f64> {
+    let [a, b, c, d, e, f, g, h, i] = *m;
+    [[a, b, c], [d, e, f], [g, h, i]]
+}
+
 /// a + b.
 #[inline(always)]
 pub fn add3<T: Lane>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {

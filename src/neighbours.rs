@@ -1,10 +1,10 @@
 //! Neighbour lists: positions in, a symmetric graph out. Nothing else is touched.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::error::{Error, Result};
 use crate::parallel;
-use crate::particles::{Lattice, Particles};
+use crate::particles::{Lattice, Mesh, Particles, Shape, Sharing};
 use crate::scene::Neighbours;
 
 /// Neighbours of every particle, ascending, without the particle itself; body's order.
@@ -21,15 +21,26 @@ impl Graph {
     /// [`Code::InvalidScene`](crate::Code::InvalidScene) naming an isolated particle or a part of
     /// the body that hangs on nothing.
     pub fn new(particles: &Particles, neighbours: Neighbours) -> Result<Self> {
-        let lists = match neighbours {
-            Neighbours::Lattice(number) => {
-                lattice_lists(&particles.lattice, particles.count(), number)
+        let lists = match (&particles.shape, neighbours) {
+            (Shape::Lattice(lattice), Neighbours::Lattice(number)) => {
+                lattice_lists(lattice, particles.count(), number)
             }
-            Neighbours::Radius { radius } => radius_lists(
+            (Shape::Lattice(lattice), Neighbours::Radius { radius }) => radius_lists(
                 &particles.positions,
-                radius * particles.lattice.largest_spacing(),
-                &particles.lattice,
+                radius * lattice.largest_spacing(),
+                lattice,
             ),
+            (Shape::Mesh(mesh), Neighbours::Lattice(number)) => {
+                let sharing = match number {
+                    6 => Sharing::Edge,
+                    18 => Sharing::Face,
+                    _ => Sharing::Cell,
+                };
+                parallel::fill(particles.count(), |i| mesh.neighbours(i as u32, sharing))
+            }
+            (Shape::Mesh(mesh), Neighbours::Radius { radius }) => {
+                mesh_radius_lists(&particles.positions, radius, mesh)
+            }
         };
         let graph = Self::from_lists(lists);
         graph.check_connected(particles)?;
@@ -167,4 +178,44 @@ fn radius_lists(positions: &[[f64; 3]], radius: f64, lattice: &Lattice) -> Vec<V
         list.sort_unstable();
         list
     })
+}
+
+/// On a mesh the radius is in multiples of the local spacing, the mean distance to the particles that
+/// share an edge, and two particles are neighbours if either reaches the other. A particle reaches
+/// what lies within its radius and hangs together with it there by cells, so that no list spans a gap.
+fn mesh_radius_lists(positions: &[[f64; 3]], radius: f64, mesh: &Mesh) -> Vec<Vec<u32>> {
+    let distance = |a: u32, b: u32| {
+        let (x, y) = (positions[a as usize], positions[b as usize]);
+        (0..3).map(|c| (y[c] - x[c]).powi(2)).sum::<f64>().sqrt()
+    };
+    let mut lists = parallel::fill(positions.len(), |i| {
+        let i = i as u32;
+        let edges = mesh.neighbours(i, Sharing::Edge);
+        let spacing = edges.iter().map(|b| distance(i, *b)).sum::<f64>() / edges.len() as f64;
+        let reach = radius * spacing * (1.0 + 1e-9);
+        let mut list = vec![i];
+        let mut seen = HashSet::from([i]);
+        let mut at = 0;
+        while at < list.len() {
+            for b in mesh.neighbours(list[at], Sharing::Cell) {
+                if distance(i, b) <= reach && seen.insert(b) {
+                    list.push(b);
+                }
+            }
+            at += 1;
+        }
+        list.sort_unstable();
+        list.retain(|b| *b != i);
+        list
+    });
+    for a in 0..lists.len() {
+        for k in 0..lists[a].len() {
+            let b = lists[a][k] as usize;
+            // What stands in a shorter list by now was put there by this loop, or was there.
+            if let Err(place) = lists[b].binary_search(&(a as u32)) {
+                lists[b].insert(place, a as u32);
+            }
+        }
+    }
+    lists
 }

@@ -4,10 +4,10 @@ use crate::boundary::{Boundary, Input, InputValues, Patch, Quantity};
 use crate::error::{Code, Error, Result};
 use crate::fields::Field;
 use crate::formulation::angular_momentum;
-use crate::formulation::url::{Breakdown, Evaluation, State, Url};
+use crate::formulation::url::{Breakdown, Evaluation, State, Trouble, Url};
 use crate::integrator::{ANGULAR_ARMS, SSP_RK3};
 use crate::layout::{Array, Layout};
-use crate::ledger::{Accounts, Energies, Momenta, Resultant};
+use crate::ledger::{Accounts, Energies, HeatResultant, Momenta, Resultant};
 use crate::material::Law;
 use crate::math::*;
 use crate::neighbours::Graph;
@@ -15,7 +15,7 @@ use crate::parallel::{self, Pool};
 use crate::particles::Particles;
 use crate::plan::Plan;
 use crate::reference::{Reference, Updated};
-use crate::scene::{Numerics, ReferenceUpdate, Scene};
+use crate::scene::{Numerics, ReferenceUpdate, ScalarFunction, Scene};
 use crate::snapshot::Snapshot;
 
 /// A body in motion. Created from a [`Scene`], advanced in time, read by fields and resultants.
@@ -46,6 +46,8 @@ pub struct Simulation {
     velocity_before: Option<Array<3>>,
     evaluation: Evaluation,
     resultants: Vec<Resultant>,
+    /// Empty of a body without heat.
+    heat_resultants: Vec<HeatResultant>,
     generation: u64,
     /// Stable step at time 0 [s].
     first_step: f64,
@@ -130,13 +132,13 @@ impl Simulation {
         let particles = Particles::new(&scene)?;
         let boundary = Boundary::new(&scene, &particles)?;
         let probes = Probes::new(&scene, &particles)?;
-        let law = Law::new(&scene.material);
+        let (law, thermal) = Law::of(&scene);
         let numerics = &scene.numerics;
         let (reference, state, url) = pool.install(|| -> Result<_> {
             let graph = Graph::new(&particles, numerics.neighbours)?;
             let reference = Reference::new(&particles, &graph, numerics)?;
-            let state = initial_state(&scene, &reference, &particles)?;
-            let url = Url::new(&reference, law, numerics);
+            let url = Url::new(&reference, law, thermal, numerics);
+            let state = initial_state(&scene, &url, &reference, &particles)?;
             Ok((reference, state, url))
         })?;
         let mut this = Self {
@@ -159,12 +161,21 @@ impl Simulation {
             url,
             evaluation: Evaluation::default(),
             resultants: Vec::new(),
+            heat_resultants: Vec::new(),
             generation: 0,
             first_step: 0.0,
             scene,
         };
         this.boundary
             .constrain(&mut this.state.v, 0.0, &this.inputs)?;
+        hold_temperatures(
+            &this.boundary,
+            &this.url,
+            &mut this.state,
+            &this.reference,
+            0.0,
+            &this.inputs,
+        )?;
         this.evaluate().map_err(|e| {
             let place = e.place().clone();
             let error = Error::scene(
@@ -175,8 +186,9 @@ impl Simulation {
             error.at_particle(place.particle.unwrap_or(0), place.position)
         })?;
         this.first_step = this.stable_step();
-        this.accounts.initial = this.evaluation.kinetic + this.evaluation.strain;
-        this.resultants = this.compute_resultants()?;
+        let e = &this.evaluation;
+        this.accounts.initial = e.kinetic + e.strain + e.thermal;
+        (this.resultants, this.heat_resultants) = this.compute_resultants()?;
         // A load that has no finite value at the start is an error of the scene, not of its first step.
         this.nodal_forces()?;
         Ok(this)
@@ -254,10 +266,11 @@ impl Simulation {
     }
 
     /// Largest stable step from the present state [s]: the scene's fixed step, or
-    /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63).
+    /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63), and no more than explicit conduction bears.
     pub fn stable_step(&self) -> f64 {
         let linear = self.cfl_number() * self.evaluation.length / self.url.wave_speeds().pressure;
-        self.scene.numerics.time_step.unwrap_or(linear)
+        let stable = linear.min(self.evaluation.conduction_step);
+        self.scene.numerics.time_step.unwrap_or(stable)
     }
 
     /// The CFL number alpha of the scene, or the default for its neighbours.
@@ -292,19 +305,19 @@ impl Simulation {
             .at_time(self.time));
         }
         let (steps, accounts) = (self.steps, self.accounts);
-        let velocity = self.take_over_inputs()?;
+        let before = self.take_over_inputs()?;
         let outcome = self.steps_until(t_next, observer);
-        if let (Err(_), Some(velocity)) = (&outcome, velocity)
+        if let (Err(_), Some((velocity, entropy))) = (&outcome, before)
             && self.steps == steps
         {
             // Not one step was made: the impulse of the inputs is taken back with it.
-            self.state.v = velocity;
+            (self.state.v, self.state.eta) = (velocity, entropy);
             self.accounts = accounts;
             self.evaluate()?;
         }
         let resultants = self.compute_resultants();
         outcome?;
-        self.resultants = resultants?;
+        (self.resultants, self.heat_resultants) = resultants?;
         Ok(())
     }
 
@@ -420,15 +433,30 @@ impl Simulation {
                 accounts.external_work +=
                     share * (power? - boundary.constrained_power(&url.rates.force, &state.v));
                 accounts.dissipation += share * evaluation.dissipation;
+                accounts.conduction += share * evaluation.conduction;
+                if let Some(mut heat) = url.rates.heat.take() {
+                    let temperature = |slot| url.evaluated_temperature(slot);
+                    let power =
+                        boundary.add_heat(&mut heat, temperature, reference, stage_time, inputs);
+                    url.rates.heat = Some(heat);
+                    accounts.heat_in += share * url.heat_power(power?);
+                }
                 url.advance_stage(state, start, reference, (stage.keep, stage.take), dt);
                 let next = SSP_RK3.get(i + 1).map_or(end, |next| time + next.time * dt);
                 boundary.constrain(&mut state.v, next, inputs)?;
-                if i + 1 == SSP_RK3.len() && is_stale(numerics, steps) {
+                let last = i + 1 == SSP_RK3.len();
+                if last {
+                    accounts.plastic += url.commit(state, reference, dt);
+                }
+                accounts.heat_in +=
+                    stage.carry * hold_temperatures(boundary, url, state, reference, next, inputs)?;
+                if last && is_stale(numerics, steps) {
                     url.update_reference(state, reference)
                         .map_err(|b| diverged(b, state))?;
                 }
+                let elapsed = (!last).then_some(next - time);
                 *evaluation = url
-                    .evaluate(state, reference)
+                    .evaluate(state, reference, elapsed)
                     .map_err(|b| diverged(b, state))?;
             }
             // What the supports did: they held the constrained components against all forces.
@@ -452,49 +480,83 @@ impl Simulation {
             ..
         } = self;
         self.evaluation = pool
-            .install(|| url.evaluate(state, reference))
+            .install(|| url.evaluate(state, reference, None))
             .map_err(|b| diverged(b, &self.state, &self.order, self.time))?;
         Ok(())
     }
 
-    /// An external velocity that was set since the last step acts at once, as an impulse; the
-    /// velocities before it.
-    fn take_over_inputs(&mut self) -> Result<Option<Array<3>>> {
-        let driven = |i: &Input| i.quantity == Quantity::Velocity;
+    /// An external velocity or temperature that was set since the last step acts at once, as an
+    /// impulse; the velocities and entropies before it.
+    fn take_over_inputs(&mut self) -> Result<Option<(Array<3>, Option<Array<1>>)>> {
+        let driven = |i: &Input| matches!(i.quantity, Quantity::Velocity | Quantity::Temperature);
         if !self.boundary.inputs.iter().any(driven) {
             return Ok(None);
         }
         let held = self.boundary.constrained_kinetic(&self.state.v);
-        let old = self.state.v.clone();
-        let changed = self
-            .boundary
-            .constrain(&mut self.state.v, self.time, &self.inputs)
-            .inspect_err(|_| self.state.v.copy_from(&old))?;
-        if !changed {
-            return Ok(None);
-        }
-        if let Err(error) = self.evaluate() {
-            self.state.v = old;
-            self.evaluate()?;
-            return Err(error);
-        }
+        let old = (self.state.v.clone(), self.state.eta.clone());
+        let (boundary, inputs, state) = (&self.boundary, &self.inputs, &mut self.state);
+        let changed = boundary
+            .constrain(&mut state.v, self.time, inputs)
+            .and_then(|_| {
+                hold_temperatures(
+                    boundary,
+                    &self.url,
+                    state,
+                    &self.reference,
+                    self.time,
+                    inputs,
+                )
+            });
+        let evaluated = changed.and_then(|heat| self.evaluate().map(|()| heat));
+        let heat = match evaluated {
+            Ok(heat) => heat,
+            Err(error) => {
+                (self.state.v, self.state.eta) = old;
+                self.evaluate()?;
+                return Err(error);
+            }
+        };
         self.accounts.external_work += self.boundary.constrained_kinetic(&self.state.v) - held;
+        self.accounts.heat_in += heat;
         self.generation += 1;
         Ok(Some(old))
     }
 
-    fn compute_resultants(&self) -> Result<Vec<Resultant>> {
+    fn compute_resultants(&self) -> Result<(Vec<Resultant>, Vec<HeatResultant>)> {
         let now = (self.time, self.stable_step());
+        let (url, state, reference) = (&self.url, &self.state, &self.reference);
         self.pool.install(|| {
-            self.boundary
-                .resultants(&self.url, &self.state, &self.reference, now, &self.inputs)
+            let resultants = self
+                .boundary
+                .resultants(url, state, reference, now, &self.inputs)?;
+            let Some(heat) = &url.rates.heat else {
+                return Ok((resultants, Vec::new()));
+            };
+            let heat = self.boundary.heat_resultants(
+                heat,
+                reference,
+                |slot| url.evaluated_temperature(slot),
+                |slot, rate| url.heat_uptake(state, reference, slot, rate),
+                now,
+                &self.inputs,
+            )?;
+            Ok((resultants, heat))
         })
+    }
+
+    /// Heat resultants of a patch now; `None` of a body without heat.
+    ///
+    /// # Panics
+    /// If `patch` is not an index into [`patches`](Self::patches) of a body with heat.
+    pub fn heat_resultant(&self, patch: usize) -> Option<HeatResultant> {
+        (!self.heat_resultants.is_empty()).then(|| self.heat_resultants[patch])
     }
 
     /// Energies now.
     pub fn energies(&self) -> Energies {
+        let thermal = self.url.thermal();
         self.accounts
-            .energies(self.evaluation.kinetic, self.evaluation.strain)
+            .energies(&self.evaluation, thermal.map_or(0.0, |t| t.theta_r))
     }
 
     /// Momenta now.
@@ -582,7 +644,7 @@ impl Simulation {
         self.boundary.check_input(index, values)?;
         let old = std::mem::replace(&mut self.inputs[index], values.to_vec());
         match self.compute_resultants() {
-            Ok(resultants) => self.resultants = resultants,
+            Ok(resultants) => (self.resultants, self.heat_resultants) = resultants,
             Err(error) => {
                 self.inputs[index] = old;
                 return Err(error);
@@ -615,6 +677,7 @@ impl Simulation {
             ))
             .at_field(field.info().name));
         }
+        self.has_field(field)?;
         let force = match field {
             Field::NodalForce => Some(self.nodal_forces()?),
             _ => None,
@@ -626,6 +689,23 @@ impl Simulation {
             });
         });
         Ok(())
+    }
+
+    /// Whether this scene has the field.
+    ///
+    /// # Errors
+    /// [`Code::InvalidArgument`] with what the scene would need.
+    pub fn has_field(&self, field: Field) -> Result<()> {
+        let remedy = match field {
+            Field::Temperature | Field::Entropy if self.state.eta.is_none() => {
+                "the body has no temperature: add a section `heat` to the scene"
+            }
+            Field::EquivalentPlasticStrain if self.state.history.is_none() => {
+                "the material has no plastic strain: choose a material with plasticity"
+            }
+            _ => return Ok(()),
+        };
+        Err(Error::argument(remedy).at_field(field.info().name))
     }
 
     /// Value of a field at a slot; unused components are 0.
@@ -641,10 +721,21 @@ impl Simulation {
             Field::Velocity => return vector(self.state.v.get(slot)),
             Field::InitialVolume => return scalar(self.reference.volume.get(slot)[0]),
             Field::NodalForce => return vector(force.expect("computed for this field").get(slot)),
+            Field::Temperature => {
+                return scalar(self.url.temperature(&self.state, &self.reference, slot));
+            }
+            Field::Entropy => {
+                let eta = self.state.eta.as_ref();
+                return scalar(eta.expect("checked by the caller").get(slot)[0]);
+            }
+            Field::EquivalentPlasticStrain => {
+                let [.., strain] = self.state.history_at(slot);
+                return scalar(strain);
+            }
             _ => {}
         }
         let deformation = self.url.deformation(&self.state, &self.reference, slot);
-        let point = self.url.law().at(&deformation);
+        let point = self.url.point(&self.state, &self.reference, slot);
         let trace = point.cauchy[0][0] + point.cauchy[1][1] + point.cauchy[2][2];
         match field {
             Field::DeformationGradient => tensor(&deformation.f),
@@ -713,6 +804,8 @@ impl Simulation {
         let same_shape = snapshot.state.x.layout() == self.state.x.layout()
             && snapshot.state.h.is_some() == self.state.h.is_some()
             && snapshot.state.j.is_some() == self.state.j.is_some()
+            && snapshot.state.eta.is_some() == self.state.eta.is_some()
+            && snapshot.state.history.is_some() == self.state.history.is_some()
             && shape(&snapshot.updated) == shape(&self.reference.updated)
             && snapshot.inputs.len() == self.inputs.len()
             && snapshot.time.is_finite();
@@ -729,7 +822,7 @@ impl Simulation {
         let restored = self.put(snapshot).and_then(|()| self.compute_resultants());
         match restored {
             Ok(resultants) => {
-                self.resultants = resultants;
+                (self.resultants, self.heat_resultants) = resultants;
                 Ok(())
             }
             Err(error) => {
@@ -775,7 +868,7 @@ impl Probes {
             weights: Vec::new(),
         };
         for (name, point) in &scene.probes {
-            let weights = particles.lattice.interpolation(*point).ok_or_else(|| {
+            let weights = particles.interpolation(*point).ok_or_else(|| {
                 Error::scene(format!("probes.{name}"), "the point lies outside the body")
             })?;
             this.names.push(name.clone());
@@ -789,10 +882,16 @@ impl Probes {
 /// that it is consistent with the operators.
 pub(crate) fn initial_state(
     scene: &Scene,
+    url: &Url,
     reference: &Reference,
     particles: &Particles,
 ) -> Result<State> {
-    let mut state = State::at_rest(reference, scene.numerics.state);
+    let mut state = State::at_rest(
+        reference,
+        scene.numerics.state,
+        &url.law(),
+        url.thermal().is_some(),
+    );
     let finite = |value: [f64; 3], path: &str, i: usize| {
         if value.iter().all(|v| v.is_finite()) {
             return Ok(value);
@@ -817,6 +916,21 @@ pub(crate) fn initial_state(
         }
         crate::formulation::url::deform(&mut state, reference);
     }
+    if let Some(heat) = &scene.heat {
+        let function = match &scene.initial.temperature {
+            Some(temperature) => temperature.compile()?,
+            None => ScalarFunction::Constant(heat.reference_temperature),
+        };
+        for (i, x) in particles.positions.iter().enumerate() {
+            let theta = function.eval(*x, 0.0);
+            if !(theta > 0.0 && theta.is_finite()) {
+                let text = format!("the absolute temperature is {theta} K here, not above 0");
+                return Err(Error::scene("initial.temperature", text)
+                    .at_particle(particles.caller(i), Some(*x)));
+            }
+            url.set_temperature(&mut state, reference, Layout::slot(i), theta);
+        }
+    }
     Ok(state)
 }
 
@@ -829,12 +943,33 @@ fn is_stale(numerics: &Numerics, steps: u64) -> bool {
     }
 }
 
+/// Gives the particles with a prescribed temperature theirs; the heat that this takes [J].
+fn hold_temperatures(
+    boundary: &Boundary,
+    url: &Url,
+    state: &mut State,
+    reference: &Reference,
+    t: f64,
+    inputs: &InputValues,
+) -> Result<f64> {
+    let mut supplied = 0.0;
+    boundary.hold_temperatures(t, inputs, |slot, theta| {
+        supplied += url.set_temperature(state, reference, slot, theta);
+    })?;
+    Ok(supplied)
+}
+
 fn diverged(b: Breakdown, state: &State, order: &[u32], time: f64) -> Error {
-    let (field, what) = if b.jacobian.is_nan() {
-        (Field::Velocity, "a velocity is not finite".to_string())
-    } else {
-        let what = format!("the volume ratio of a particle is {:.3e}", b.jacobian);
-        (Field::Jacobian, what)
+    let (field, what) = match b.trouble {
+        Trouble::Velocity => (Field::Velocity, "a velocity is not finite".to_string()),
+        Trouble::Temperature(theta) => {
+            let what = format!("the temperature of a particle is {theta:.3e} K");
+            (Field::Temperature, what)
+        }
+        Trouble::VolumeRatio(ratio) => {
+            let what = format!("the volume ratio of a particle is {ratio:.3e}");
+            (Field::Jacobian, what)
+        }
     };
     Error::new(
         Code::Diverged,

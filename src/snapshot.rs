@@ -87,6 +87,11 @@ impl Snapshot {
         let a = &mut self.accounts;
         for value in [
             &mut a.initial,
+            &mut a.heat_in,
+            &mut a.plastic.work,
+            &mut a.plastic.heat,
+            &mut a.plastic.entropy,
+            &mut a.conduction,
             &mut a.external_work,
             &mut a.dissipation,
             &mut a.projection,
@@ -106,6 +111,8 @@ impl Snapshot {
         walk.array(&mut self.state.f)?;
         walk.optional(&mut self.state.h, layout)?;
         walk.optional(&mut self.state.j, layout)?;
+        walk.optional(&mut self.state.eta, layout)?;
+        walk.optional(&mut self.state.history, layout)?;
         let mut updated = u64::from(self.updated.is_some());
         walk.word(&mut updated)?;
         if updated == 1 {
@@ -184,6 +191,8 @@ impl Snapshot {
                 f: Array::new(layout, identity()),
                 h: None,
                 j: None,
+                eta: None,
+                history: None,
             },
             updated: None,
         };

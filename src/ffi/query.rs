@@ -53,12 +53,12 @@ fn field_at(field: usize) -> Result<&'static FieldInfo> {
 }
 
 pub(super) fn quantity_at(quantity: i32) -> Result<Quantity> {
-    [Quantity::Traction, Quantity::Pressure, Quantity::Velocity]
+    Quantity::ALL
         .into_iter()
         .find(|&q| urlsph_quantity::from(q) as i32 == quantity)
         .ok_or_else(|| {
             Error::argument(format!(
-                "{quantity} is not a quantity: give URLSPH_TRACTION, URLSPH_PRESSURE or URLSPH_VELOCITY"
+                "{quantity} is not a quantity: give one of urlsph_quantity, such as URLSPH_TRACTION"
             ))
         })
 }
@@ -69,6 +69,10 @@ impl From<Quantity> for urlsph_quantity {
             Quantity::Traction => Self::URLSPH_TRACTION,
             Quantity::Pressure => Self::URLSPH_PRESSURE,
             Quantity::Velocity => Self::URLSPH_VELOCITY,
+            Quantity::HeatFlux => Self::URLSPH_HEAT_FLUX,
+            Quantity::Temperature => Self::URLSPH_TEMPERATURE,
+            Quantity::ConvectionCoefficient => Self::URLSPH_CONVECTION_COEFFICIENT,
+            Quantity::AmbientTemperature => Self::URLSPH_AMBIENT_TEMPERATURE,
         }
     }
 }

@@ -2,17 +2,17 @@
 
 use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
-use super::url::{Breakdown, Scratch, State};
+use super::url::{Breakdown, Scratch, State, Trouble};
 use crate::lane::{Lane, PerSlot, SLICE, Work};
 use crate::layout::Array;
-use crate::material::{Deformation, Material};
+use crate::material::{Deformation, Material, Thermal};
 use crate::math::*;
 use crate::reference::{PairVectors, Reference, load3, load9, store3, store9};
 
 /// Read access to a state and its reference, by components.
 #[derive(Clone, Copy)]
 pub(super) struct Kinematics<'a> {
-    f: [&'a [f64]; 9],
+    pub(super) f: [&'a [f64]; 9],
     h: Option<[&'a [f64]; 9]>,
     j: Option<&'a [f64]>,
     f_chi: Option<[&'a [f64]; 9]>,
@@ -34,33 +34,24 @@ impl<'a> Kinematics<'a> {
             j_chi: updated.map(|u| u.j_chi.components()[0]),
         }
     }
-    /// `STATE` counts the independent measures beside f, `UPDATED` tells whether there is a
-    /// reference beside the initial configuration: both known when the loop is compiled.
+    /// Total deformation of the particles in the slots from `at`.
     #[inline(always)]
-    pub(super) fn total<T: Lane, const STATE: u8, const UPDATED: bool>(
-        &self,
-        token: T::Token,
-        at: usize,
-    ) -> Deformation<T> {
+    pub(super) fn total<T: Lane>(&self, token: T::Token, at: usize) -> Deformation<T> {
         let mut f = load9::<T>(token, &self.f, at);
-        if UPDATED && let Some(f_chi) = &self.f_chi {
+        if let Some(f_chi) = &self.f_chi {
             f = mat_mul(&f, &load9(token, f_chi, at));
         }
         let mut h = cofactor(&f);
         let mut j = dot(f[0], h[0]);
-        if STATE >= 1
-            && let Some(own) = self.j
-        {
+        if let Some(own) = self.j {
             j = T::load(token, own, at);
-            if UPDATED && let Some(j_chi) = self.j_chi {
+            if let Some(j_chi) = self.j_chi {
                 j = j * T::load(token, j_chi, at);
             }
         }
-        if STATE >= 2
-            && let Some(own) = &self.h
-        {
+        if let Some(own) = &self.h {
             h = load9(token, own, at);
-            if UPDATED && let Some(h_chi) = &self.h_chi {
+            if let Some(h_chi) = &self.h_chi {
                 h = mat_mul(&h, &load9(token, h_chi, at));
             }
         }
@@ -75,6 +66,11 @@ fn load_slab3<T: Lane>(token: T::Token, from: &[&mut [f64]; 3], at: usize) -> Ve
 }
 
 #[inline(always)]
+fn load7<T: Lane>(token: T::Token, from: &[&[f64]; 7], at: usize) -> [T; 7] {
+    std::array::from_fn(|c| T::load(token, from[c], at))
+}
+
+#[inline(always)]
 fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [f64]; 9], at: usize) -> Mat3<T> {
     let [a, b, c, d, e, f, g, h, i] = from;
     load9(token, &[a, b, c, d, e, f, g, h, i], at)
@@ -82,7 +78,10 @@ fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [f64]; 9], at: usize) -> Ma
 
 /// Slots of a slab as (offset in the slab, slot), by lanes.
 #[inline(always)]
-fn lanes_of<T: Lane>(reference: &Reference, slab: usize) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn lanes_of<T: Lane>(
+    reference: &Reference,
+    slab: usize,
+) -> impl Iterator<Item = (usize, usize)> {
     let (first, slices) = reference.layout.slab_range(slab);
     std::iter::zip(
         (0..slices * SLICE).step_by(T::WIDTH),
@@ -117,21 +116,203 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
     }
 }
 
-/// Output of the gradient and point passes for one slab.
+/// Output of the gradient, law and point passes for one slab.
 pub(super) struct PointOutput<'a> {
     pub grad_v: [&'a mut [f64]; 9],
+    /// P from the law pass, where formulation and material meet; Q from the point pass.
     pub q: [&'a mut [f64]; 9],
     pub s: Option<[&'a mut [f64]; 9]>,
     pub half_grad: Option<[&'a mut [f64]; 9]>,
     pub wave: [&'a mut [f64]; 2],
     pub sigma_j: Option<&'a mut [f64]>,
+    /// Temperature and the variable whose gradient drives conduction.
+    pub theta: Option<[&'a mut [f64]; 2]>,
 }
 
-/// Everything of one particle that its neighbours need; (strain, kinetic) energy of the slab.
+/// What particles store, summed over a slab.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stored {
+    /// Strain energy [J].
+    pub strain: f64,
+    /// Thermal energy [J].
+    pub thermal: f64,
+    /// Entropy [J/K].
+    pub entropy: f64,
+}
+
+/// What the law pass reads.
+#[derive(Clone, Copy)]
+pub(super) struct LawInputs<'a> {
+    pub kinematics: Kinematics<'a>,
+    pub reference: &'a Reference,
+    /// Entropy per unit initial volume, of a body with heat.
+    pub heat: Option<(&'a [f64], Thermal)>,
+    pub history: Option<[&'a [f64]; 7]>,
+    /// Time since the step's start [s].
+    pub elapsed: f64,
+}
+
+/// The law pass: stress, temperature and energy of one slab from the total deformation.
 ///
-/// `STATE` and `UPDATED` as in [`Kinematics::total`].
-pub(super) struct Points<'a, 'o, M, const STATE: u8, const UPDATED: bool> {
+/// `HEAT` and `FLOW` tell when the loop is compiled whether the body has a temperature and whether
+/// the history is mapped.
+pub(super) struct Laws<'a, 'o, M, const HEAT: bool, const FLOW: bool> {
     pub law: M,
+    pub inputs: LawInputs<'a>,
+    pub slab: usize,
+    pub out: &'o mut PointOutput<'a>,
+}
+
+impl<M: Material, const HEAT: bool, const FLOW: bool> Work for Laws<'_, '_, M, HEAT, FLOW> {
+    type Output = std::result::Result<Stored, Breakdown>;
+    #[inline(always)]
+    fn run<T: Lane>(self, token: T::Token) -> Self::Output {
+        let Self { law, out, .. } = self;
+        let LawInputs {
+            kinematics,
+            reference,
+            ..
+        } = self.inputs;
+        let volume = reference.volume.components()[0];
+        let density = T::splat(token, law.density());
+        let elapsed = T::splat(token, self.inputs.elapsed);
+        let [mut strain, mut heat, mut entropy] = [PerSlot::new(0.0); 3];
+        let mut admissible = PerSlot::new(1.0);
+        let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
+        let infinity = T::splat(token, f64::INFINITY);
+        for (at, a) in lanes_of::<T>(reference, self.slab) {
+            let total = kinematics.total::<T>(token, a);
+            let v_r = T::load(token, volume, a);
+            let mut history = match &self.inputs.history {
+                Some(history) if M::HISTORY => load7(token, history, a),
+                _ => [zero; 7],
+            };
+            let mut theta = zero;
+            let mut warmth = None;
+            if HEAT && let Some((eta, thermal)) = self.inputs.heat {
+                let eta = T::load(token, eta, a);
+                let w = thermal.warmth(&total, eta);
+                theta = w.theta;
+                warmth = Some((thermal, w, eta));
+            }
+            let mut stress = law.stress::<T, FLOW>(&total, theta, &mut history, elapsed);
+            // 1 where J, det F and the temperature are positive and finite, else 0. A comparison
+            // with NaN is false.
+            let det = dot(total.f[0], cofactor(&total.f)[0]);
+            let mut good = (infinity - det).if_positive(det.if_positive(one, zero), zero);
+            if kinematics.j.is_some() {
+                let j = total.j;
+                good = (infinity - j).if_positive(j.if_positive(good, zero), zero);
+            }
+            if let (Some((thermal, w, eta)), Some([out_theta, beta])) = (warmth, &mut out.theta) {
+                thermal.couple(&total, &w, &mut stress);
+                theta.store(out_theta, at);
+                w.beta.store(beta, at);
+                heat.add(at, v_r * w.energy);
+                entropy.add(at, v_r * eta);
+                good = (infinity - theta).if_positive(theta.if_positive(good, zero), zero);
+            }
+            admissible.min(at, good);
+            strain.add(at, v_r * stress.energy);
+            store9(&stress.p, &mut out.q, at);
+            stress.stretch.store(out.wave[0], at);
+            (density / total.j).store(out.wave[1], at);
+            if let Some(sigma_j) = &mut out.sigma_j {
+                stress.sigma_j.store(sigma_j, at);
+            }
+        }
+        if admissible.least() < 1.0 {
+            let (first, _) = reference.layout.slab_range(self.slab);
+            let theta = out.theta.as_ref().map(|[theta, _]| &**theta);
+            return Err(first_breakdown(reference, self.slab, |slot| {
+                let total = kinematics.total::<f64>((), slot);
+                let theta = theta.map_or(1.0, |theta| theta[slot - first]);
+                inadmissible(&total, theta)
+            }));
+        }
+        Ok(Stored {
+            strain: strain.sum(),
+            thermal: heat.sum(),
+            entropy: entropy.sum(),
+        })
+    }
+}
+
+/// Plastic flow over a step, and its heat, for one slab; plastic work and the part of it that
+/// becomes heat [J], and the entropy that it produces [J/K].
+pub(super) struct Flow<'a, M> {
+    pub law: M,
+    pub kinematics: Kinematics<'a>,
+    pub reference: &'a Reference,
+    pub elapsed: f64,
+    pub slab: usize,
+    pub history: [&'a mut [f64]; 7],
+    pub heat: Option<(&'a mut [f64], Thermal)>,
+}
+
+impl<M: Material> Work for Flow<'_, M> {
+    type Output = Plastic;
+    #[inline(always)]
+    fn run<T: Lane>(mut self, token: T::Token) -> Plastic {
+        let volume = self.reference.volume.components()[0];
+        let elapsed = T::splat(token, self.elapsed);
+        let [mut work, mut heat, mut entropy] = [PerSlot::new(0.0); 3];
+        for (at, a) in lanes_of::<T>(self.reference, self.slab) {
+            let total = self.kinematics.total::<T>(token, a);
+            let v_r = T::load(token, volume, a);
+            let mut history: [T; 7] = std::array::from_fn(|c| T::load(token, self.history[c], at));
+            let mut theta = T::splat(token, 0.0);
+            if let Some((eta, thermal)) = &self.heat {
+                let now = T::load(token, eta, at);
+                theta = thermal.warmth(&total, now).theta;
+            }
+            let stress = self
+                .law
+                .stress::<T, true>(&total, theta, &mut history, elapsed);
+            for (c, value) in history.into_iter().enumerate() {
+                value.store(self.history[c], at);
+            }
+            work.add(at, v_r * stress.dissipation);
+            if let Some((eta, thermal)) = &mut self.heat {
+                let gain = thermal.plastic_heat(stress.dissipation);
+                let produced = thermal.entropy_of_heat(theta, gain);
+                let now = T::load(token, eta, at);
+                (now + produced).store(eta, at);
+                heat.add(at, v_r * gain);
+                entropy.add(at, v_r * produced);
+            }
+        }
+        Plastic {
+            work: work.sum(),
+            heat: heat.sum(),
+            entropy: entropy.sum(),
+        }
+    }
+}
+
+/// What plastic flow did in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Plastic {
+    /// Plastic work [J].
+    pub work: f64,
+    /// The part of it that became heat [J].
+    pub heat: f64,
+    /// Entropy that it produced [J/K].
+    pub entropy: f64,
+}
+
+impl std::ops::AddAssign for Plastic {
+    fn add_assign(&mut self, other: Self) {
+        self.work += other.work;
+        self.heat += other.heat;
+        self.entropy += other.entropy;
+    }
+}
+
+/// The rest of one particle that its neighbours need, from the incremental deformation; kinetic
+/// energy of the slab.
+pub(super) struct Points<'a, 'o> {
+    pub density: f64,
     pub kinematics: Kinematics<'a>,
     pub reference: &'a Reference,
     pub v: [&'a [f64]; 3],
@@ -139,40 +320,27 @@ pub(super) struct Points<'a, 'o, M, const STATE: u8, const UPDATED: bool> {
     pub out: &'o mut PointOutput<'a>,
 }
 
-impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, M, STATE, UPDATED> {
-    type Output = std::result::Result<(f64, f64), Breakdown>;
+impl Work for Points<'_, '_> {
+    type Output = std::result::Result<f64, Breakdown>;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> Self::Output {
         let Self {
-            law,
             kinematics,
             reference,
             v,
             slab,
             out,
+            ..
         } = self;
         let (l, volume) = (reference.l.components(), reference.volume.components()[0]);
-        let density = T::splat(token, law.density());
+        let density = T::splat(token, self.density);
         let half = T::splat(token, 0.5);
-        let (mut strain, mut kinetic) = (PerSlot::new(0.0), PerSlot::new(0.0));
+        let mut kinetic = PerSlot::new(0.0);
         let mut admissible = PerSlot::new(1.0);
         let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
         let infinity = T::splat(token, f64::INFINITY);
         for (at, a) in lanes_of::<T>(reference, slab) {
-            let total = kinematics.total::<T, STATE, UPDATED>(token, a);
-            let stress = law.stress(&total.f, &total.h, total.j);
             let (l, v_r) = (load9::<T>(token, &l, a), T::load(token, volume, a));
-
-            // Smallest stretch of F: 1/lambda^2 is the largest eigenvalue of F^-T F^-1.
-            let cof = if STATE >= 2 {
-                cofactor(&total.f)
-            } else {
-                total.h
-            };
-            let det = dot(total.f[0], cof[0]);
-            let stretch = det / largest_eigenvalue(&mat_mul_t(&cof, &cof)).sqrt();
-            stretch.store(out.wave[0], at);
-            (density / total.j).store(out.wave[1], at);
 
             // 1/2 grad_chi v f^-1, f^-1 from f itself.
             let f = load9::<T>(token, &kinematics.f, a);
@@ -186,87 +354,68 @@ impl<M: Material, const STATE: u8, const UPDATED: bool> Work for Points<'_, '_, 
             // Q = V_R P F_chi^T L and S = V_chi h L.
             let mut k = scale9(v_r, &l);
             let mut v_chi = v_r;
-            if UPDATED && let (Some(f_chi), Some(j_chi)) = (&kinematics.f_chi, kinematics.j_chi) {
+            if let (Some(f_chi), Some(j_chi)) = (&kinematics.f_chi, kinematics.j_chi) {
                 k = mat_mul(&transpose(&load9(token, f_chi, a)), &k);
                 v_chi = v_r * T::load(token, j_chi, a);
             }
-            store9(&mat_mul(&stress.p, &k), &mut out.q, at);
+            let p = load_slab9::<T>(token, &out.q, at);
+            store9(&mat_mul(&p, &k), &mut out.q, at);
             if let Some(out) = &mut out.s {
-                let h = match (STATE, &kinematics.h) {
-                    (2.., Some(h)) => load9(token, h, a),
-                    _ => cof_f,
+                let h = match &kinematics.h {
+                    Some(h) => load9(token, h, a),
+                    None => cof_f,
                 };
                 store9(&scale9(v_chi, &mat_mul(&h, &l)), out, at);
             }
-            if let Some(sigma_j) = &mut out.sigma_j {
-                stress.sigma_j.store(sigma_j, at);
-            }
 
             let velocity = load3::<T>(token, &v, a);
-            strain.add(at, v_r * stress.energy);
             let motion = half * density * v_r * dot(velocity, velocity);
             kinetic.add(at, motion);
-
-            // 1 where J and det F are positive and finite and the velocity is finite, else 0. A
-            // comparison with NaN is false, and infinity - infinity is NaN.
-            let mut good = (infinity - motion).if_positive(one, zero);
-            good = (infinity - det).if_positive(det.if_positive(good, zero), zero);
-            if STATE >= 1 {
-                let j = total.j;
-                good = (infinity - j).if_positive(j.if_positive(good, zero), zero);
-            }
-            admissible.min(at, good);
+            // Infinity - infinity is NaN.
+            admissible.min(at, (infinity - motion).if_positive(one, zero));
         }
         if admissible.least() < 1.0 {
-            return Err(first_breakdown::<STATE, UPDATED>(
-                &kinematics,
-                reference,
-                &v,
-                law.density(),
-                slab,
-            ));
+            return Err(first_breakdown(reference, slab, |slot| {
+                immovable(load3((), &v, slot), self.density * volume[slot])
+            }));
         }
-        Ok((strain.sum(), kinetic.sum()))
+        Ok(kinetic.sum())
     }
 }
 
-/// The first particle of a slab that is not admissible.
+/// The first particle of a slab that is in trouble.
 #[cold]
-fn first_breakdown<const STATE: u8, const UPDATED: bool>(
-    kinematics: &Kinematics,
+fn first_breakdown(
     reference: &Reference,
-    v: &[&[f64]; 3],
-    density: f64,
     slab: usize,
+    trouble: impl Fn(usize) -> Option<Trouble>,
 ) -> Breakdown {
-    let volume = reference.volume.components()[0];
     let (first, _) = reference.layout.slab_range(slab);
     lanes_of::<f64>(reference, slab)
         .find_map(|(_, slot)| {
-            let total = kinematics.total::<f64, STATE, UPDATED>((), slot);
-            inadmissible(&total, load3((), v, slot), density * volume[slot], slot)
+            let trouble = trouble(slot)?;
+            Some(Breakdown { slot, trouble })
         })
         .unwrap_or(Breakdown {
             slot: first,
-            jacobian: f64::NAN,
+            trouble: Trouble::VolumeRatio(f64::NAN),
         })
 }
 
-/// What breaks a particle down: a volume ratio, j's or that of F, that is not positive and finite, or
-/// a kinetic energy that is not finite, reported as a ratio that is NaN.
-pub(super) fn inadmissible(
-    total: &Deformation<f64>,
-    v: Vec3<f64>,
-    mass: f64,
-    slot: usize,
-) -> Option<Breakdown> {
+/// What breaks a particle down at rest: a volume ratio, j's or that of F, or a temperature that is
+/// not positive and finite.
+pub(super) fn inadmissible(total: &Deformation<f64>, theta: f64) -> Option<Trouble> {
     let det = dot(total.f[0], cofactor(&total.f)[0]);
-    let motion = 0.5 * mass * dot(v, v);
-    let bad = |ratio: &f64| !(*ratio > 0.0 && *ratio < f64::INFINITY);
-    [total.j, det, 1.0 + 0.0 * motion]
-        .into_iter()
-        .find(bad)
-        .map(|jacobian| Breakdown { slot, jacobian })
+    let bad = |value: &f64| !(*value > 0.0 && *value < f64::INFINITY);
+    let ratio = [total.j, det].into_iter().find(bad);
+    ratio
+        .map(Trouble::VolumeRatio)
+        .or_else(|| bad(&theta).then_some(Trouble::Temperature(theta)))
+}
+
+/// Whether a velocity, or its energy, is not finite.
+pub(super) fn immovable(v: Vec3<f64>, mass: f64) -> Option<Trouble> {
+    (!(0.5 * mass * dot(v, v)).is_finite()).then_some(Trouble::Velocity)
 }
 
 /// Scales the gradients for the reconstruction by Venkatakrishnan's limiter.
@@ -340,6 +489,18 @@ impl<'a> ForceInput<'a> {
         }
     }
 
+    /// x_a.
+    #[inline(always)]
+    pub(super) fn position<T: Lane>(&self, token: T::Token, a: usize) -> Vec3<T> {
+        load3(token, &self.x, a)
+    }
+
+    /// S_a.
+    #[inline(always)]
+    pub(super) fn area<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
+        load9(token, &self.s, a)
+    }
+
     #[inline(always)]
     fn here<T: Lane>(&self, token: T::Token, a: usize) -> Here<T> {
         Here {
@@ -380,6 +541,8 @@ pub(super) struct Forces<'a, P, const MODE: u8> {
     pub pairs: P,
     pub input: ForceInput<'a>,
     pub speeds: WaveSpeeds<f64>,
+    /// rho_R [kg/m^3].
+    pub density: f64,
     pub slab: usize,
     pub out: [&'a mut [f64]; 3],
 }
@@ -392,11 +555,12 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             pairs,
             input,
             speeds,
+            density,
             slab,
             mut out,
         } = self;
         let slices = &input.reference.slices;
-        let weights = slices.weights();
+        let (weights, volume) = (slices.weights(), input.reference.volume.components()[0]);
         let speeds = WaveSpeeds {
             pressure: T::splat(token, speeds.pressure),
             shear: T::splat(token, speeds.shear),
@@ -408,14 +572,14 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             let centre = pairs.centre::<T>(token, a);
             let qa = load9::<T>(token, &input.q, a);
             let (mut sa, mut grad_a) = ([zero3(token); 3], [zero3(token); 3]);
-            if MODE != riemann::OFF {
+            if MODE != riemann::OFF || P::BOUND_BY_AREAS {
                 sa = load9::<T>(token, &input.s, a);
             }
             if MODE == riemann::LINEAR || MODE == riemann::MINMOD {
                 grad_a = load9::<T>(token, &input.half_grad, a);
             }
             let mut force = zero3::<T>(token);
-            let mut work = T::splat(token, 0.0);
+            let (mut work, mut areas) = (T::splat(token, 0.0), T::splat(token, 0.0));
             let mut length2 = far;
             for (b, pair) in slices.of(a) {
                 let (g, back) = pairs.pair(token, &centre, b, pair);
@@ -423,8 +587,13 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                 let mask = T::load(token, weights, pair);
                 length2 = length2.min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
                 let mut f = sub3(mat_vec(&qa, g), mat_vec(&load9(token, &input.q, b), back));
-                if MODE != riemann::OFF {
+                if MODE != riemann::OFF || P::BOUND_BY_AREAS {
                     p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(token, &input.s, b), back));
+                }
+                if P::BOUND_BY_AREAS {
+                    areas = areas + dot(p.area, p.area).sqrt();
+                }
+                if MODE != riemann::OFF {
                     let (half_a, half_b) = if MODE == riemann::CONSTANT {
                         (zero3(token), zero3(token))
                     } else {
@@ -440,6 +609,13 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             }
             store3(&force, &mut out, at);
             power.add(at, work);
+            if P::BOUND_BY_AREAS {
+                // 5 lambda / kappa, kappa = sum |c_ab| / (J V_R): a particle with little volume and
+                // large areas, which irregular ones have, binds the step by more than its distances.
+                let mass = T::splat(token, density) * T::load(token, volume, a);
+                let bound = T::splat(token, 5.0) * here.stretch * mass / (here.density * areas);
+                length2 = areas.if_positive(length2.min(bound * bound), length2);
+            }
             shortest.min(at, length2);
         }
         // Each pair is seen from both sides.
@@ -447,12 +623,12 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
     }
 }
 
-/// Half the spatial gradient of Sigma_J.
+/// Half the spatial gradient of a scalar field.
 pub(super) struct HalfSlope<'a, P> {
     pub pairs: P,
     pub reference: &'a Reference,
     pub kinematics: Kinematics<'a>,
-    pub sigma: &'a [f64],
+    pub field: &'a [f64],
     pub slab: usize,
     pub out: [&'a mut [f64]; 3],
 }
@@ -464,11 +640,11 @@ impl<P: PairVectors> Work for HalfSlope<'_, P> {
         let l = self.reference.l.components();
         for (at, a) in lanes_of::<T>(self.reference, self.slab) {
             let centre = self.pairs.centre::<T>(token, a);
-            let own = T::load(token, self.sigma, a);
+            let own = T::load(token, self.field, a);
             let mut sum = zero3(token);
             for (b, pair) in self.reference.slices.of(a) {
                 let (g, _) = self.pairs.pair(token, &centre, b, pair);
-                sum = axpy3(sum, T::load(token, self.sigma, b) - own, g);
+                sum = axpy3(sum, T::load(token, self.field, b) - own, g);
             }
             let f = load9::<T>(token, &self.kinematics.f, a);
             let cof = cofactor(&f);
@@ -541,6 +717,17 @@ pub(super) struct StateSlab<'a> {
     pub f: [&'a mut [f64]; 9],
     pub h: Option<[&'a mut [f64]; 9]>,
     pub j: Option<&'a mut [f64]>,
+    pub eta: Option<&'a mut [f64]>,
+}
+
+/// What turns heat rates into rates of entropy.
+#[derive(Clone, Copy)]
+pub(super) struct Heating<'a> {
+    pub thermal: Thermal,
+    /// Heat into each particle [W].
+    pub heat: &'a [f64],
+    /// Temperature [K].
+    pub theta: &'a [f64],
 }
 
 /// One stage of the integrator for one slab: y = keep y0 + take (y + dt dy/dt).
@@ -550,6 +737,7 @@ pub(super) struct Advance<'a> {
     pub force: [&'a [f64]; 3],
     pub grad_v: [&'a [f64]; 9],
     pub j_rate: Option<&'a [f64]>,
+    pub heating: Option<Heating<'a>>,
     pub density: f64,
     pub keep: f64,
     pub take: f64,
@@ -576,6 +764,7 @@ impl Work for Advance<'_> {
         );
         let h0 = start.h.as_ref().map(Array::components);
         let j0 = start.j.as_ref().map(|j| j.components()[0]);
+        let eta0 = start.eta.as_ref().map(|e| e.components()[0]);
         let density = T::splat(token, self.density);
         for (at, a) in lanes_of::<T>(self.reference, self.slab) {
             let out = &mut self.out;
@@ -584,10 +773,8 @@ impl Work for Advance<'_> {
             let f = load_slab9::<T>(token, &out.f, at);
             let grad = load9::<T>(token, &self.grad_v, a);
             // Dummies have no volume and no force.
-            let mass = density.mul_add(
-                T::load(token, volume, a),
-                T::splat(token, f64::MIN_POSITIVE),
-            );
+            let v_r = T::load(token, volume, a);
+            let mass = density.mul_add(v_r, T::splat(token, f64::MIN_POSITIVE));
             let acceleration = scale3(T::splat(token, 1.0) / mass, load3(token, &self.force, a));
             store3(&blend.vector(load3(token, &x0, a), x, v), &mut out.x, at);
             store3(
@@ -600,6 +787,16 @@ impl Work for Advance<'_> {
                 &mut out.f,
                 at,
             );
+            if let (Some(eta), Some(eta0), Some(heating)) = (&mut out.eta, eta0, self.heating) {
+                // V_R d eta/dt = Q/theta ([URL23] 67).
+                let theta = heating.thermal.divisor(T::load(token, heating.theta, a));
+                let capacity = v_r.mul_add(theta, T::splat(token, f64::MIN_POSITIVE));
+                let rate = T::load(token, heating.heat, a) / capacity;
+                let now = T::load(token, eta, at);
+                blend
+                    .scalar(T::load(token, eta0, a), now, rate)
+                    .store(eta, at);
+            }
             if let (Some(j), Some(j0)) = (&mut out.j, j0) {
                 // dj/dt = h : grad v (56), with h = cof f where it is not independent.
                 let h = match &out.h {

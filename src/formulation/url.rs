@@ -9,18 +9,21 @@
 //! Q = V_chi sigma_chi L = V_R P F_chi^T L, and its spatial area c_ab = S_a g_ab - S_b g_ba,
 //! S = V_chi h L.
 
+use super::conduction::Conduction;
 use super::passes::{
-    Advance, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, PointOutput, Points,
-    StateSlab, VolumeRates, inadmissible,
+    Advance, Flow, ForceInput, Forces, Gradient, HalfSlope, Heating, Kinematics, LawInputs, Laws,
+    Limit, PointOutput, Points, StateSlab, Stored, VolumeRates, immovable, inadmissible,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
 use crate::layout::{Array, Layout};
-use crate::material::{Deformation, Law, Material, with_law};
+use crate::material::{Deformation, History, Law, Material, Point, Thermal, VIRGIN, with_law};
 use crate::math::*;
 use crate::parallel;
 use crate::reference::{Reference, load3, store9, with_pairs};
 use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
+
+pub use super::passes::Plastic;
 
 /// The evolving fields: with the time, what the integrator advances and a snapshot copies.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +38,10 @@ pub struct State {
     pub h: Option<Array<9>>,
     /// j, reference to current; only where independent of f.
     pub j: Option<Array<1>>,
+    /// Entropy [J/(m^3 K)], per unit initial volume; only of a body with heat.
+    pub eta: Option<Array<1>>,
+    /// [`History`] at the last step's end; only of a law that has one.
+    pub history: Option<Array<7>>,
 }
 
 /// Rates of the state, before loads and supports.
@@ -46,6 +53,9 @@ pub struct Rates {
     pub grad_v: Array<9>,
     /// dj/dt by the dissipation D^j alone [1/s]; only where D^j is on.
     pub j_dissipation: Option<Array<1>>,
+    /// Heat that flows into a particle [W]: conduction; sources and fluxes are added in place when a
+    /// stage is assembled. Only of a body with heat.
+    pub heat: Option<Array<1>>,
 }
 
 /// Per-particle quantities that neighbours read in the force pass; recomputed in every evaluation.
@@ -61,6 +71,8 @@ pub(super) struct Scratch {
     pub wave: Array<2>,
     /// Sigma_J [Pa] and half its spatial gradient [Pa/m]; only where D^j is on.
     sigma_j: Option<(Array<1>, Array<3>)>,
+    /// Temperature [K] and conduction variable; only of a body with heat.
+    pub theta: Option<Array<2>>,
 }
 
 /// Sums over the body and what an evaluation found, in a fixed order.
@@ -70,10 +82,18 @@ pub struct Evaluation {
     pub kinetic: f64,
     /// Strain energy [J].
     pub strain: f64,
+    /// Thermal energy [J].
+    pub thermal: f64,
+    /// Entropy [J/K].
+    pub entropy: f64,
+    /// Entropy that conduction produces [W/K].
+    pub conduction: f64,
     /// Power of the dissipation terms [W], positive where they take energy out.
     pub dissipation: f64,
     /// Smallest |x_ab| lambda_ab over all pairs [m]: the stable step times the linear wave speed.
     pub length: f64,
+    /// Longest time for which explicit conduction is stable [s].
+    pub conduction_step: f64,
 }
 
 /// A particle at which the solution broke down.
@@ -81,18 +101,29 @@ pub struct Evaluation {
 pub struct Breakdown {
     /// Its slot.
     pub slot: usize,
-    /// J there.
-    pub jacobian: f64,
+    /// What is wrong there.
+    pub trouble: Trouble,
+}
+
+/// What a solution breaks down of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Trouble {
+    /// J, or det F, is not positive and finite.
+    VolumeRatio(f64),
+    /// The temperature [K] is not positive and finite.
+    Temperature(f64),
+    /// A velocity is not finite.
+    Velocity,
 }
 
 /// What the scene asks of the formulation, resolved to what the loops branch on.
 #[derive(Debug, Clone, Copy)]
 struct Options {
-    state: StateMeasures,
     mode: u8,
     venkatakrishnan: bool,
     volume_dissipation: f64,
     linear: bool,
+    thermal: Option<Thermal>,
 }
 
 /// The formulation of one body.
@@ -101,13 +132,14 @@ pub struct Url {
     law: Law,
     options: Options,
     scratch: Scratch,
+    conduction: Option<Conduction>,
     /// Rates of the last evaluation.
     pub rates: Rates,
 }
 
 impl State {
-    /// A body at rest in its initial configuration.
-    pub fn at_rest(reference: &Reference, measures: StateMeasures) -> Self {
+    /// A body at rest in its initial configuration; with heat at zero entropy.
+    pub fn at_rest(reference: &Reference, measures: StateMeasures, law: &Law, heat: bool) -> Self {
         let layout = reference.layout;
         Self {
             x: reference.x_initial.clone(),
@@ -115,19 +147,28 @@ impl State {
             f: Array::new(layout, flat(&IDENTITY)),
             h: (measures == StateMeasures::Fhj).then(|| Array::new(layout, flat(&IDENTITY))),
             j: (measures != StateMeasures::F).then(|| Array::new(layout, [1.0])),
+            eta: heat.then(|| Array::new(layout, [0.0])),
+            history: law.has_history().then(|| Array::new(layout, VIRGIN)),
         }
     }
     /// Copies another state of the same body.
     pub fn copy_from(&mut self, other: &Self) {
+        fn copy<const N: usize>(to: &mut Option<Array<N>>, from: &Option<Array<N>>) {
+            if let (Some(to), Some(from)) = (to, from) {
+                to.copy_from(from);
+            }
+        }
         self.x.copy_from(&other.x);
         self.v.copy_from(&other.v);
         self.f.copy_from(&other.f);
-        if let (Some(a), Some(b)) = (&mut self.h, &other.h) {
-            a.copy_from(b);
-        }
-        if let (Some(a), Some(b)) = (&mut self.j, &other.j) {
-            a.copy_from(b);
-        }
+        copy(&mut self.h, &other.h);
+        copy(&mut self.j, &other.j);
+        copy(&mut self.eta, &other.eta);
+        copy(&mut self.history, &other.history);
+    }
+    /// History of the particle in a slot.
+    pub fn history_at(&self, slot: usize) -> History<f64> {
+        self.history.as_ref().map_or(VIRGIN, |h| h.get(slot))
     }
     /// Bytes held.
     pub fn bytes(&self) -> usize {
@@ -136,12 +177,19 @@ impl State {
             + self.f.bytes()
             + self.h.as_ref().map_or(0, Array::bytes)
             + self.j.as_ref().map_or(0, Array::bytes)
+            + self.eta.as_ref().map_or(0, Array::bytes)
+            + self.history.as_ref().map_or(0, Array::bytes)
     }
 }
 
 impl Url {
     /// The formulation for a body.
-    pub fn new(reference: &Reference, law: Law, numerics: &Numerics) -> Self {
+    pub fn new(
+        reference: &Reference,
+        law: Law,
+        thermal: Option<Thermal>,
+        numerics: &Numerics,
+    ) -> Self {
         let layout = reference.layout;
         let linear = numerics.reconstruction == Reconstruction::Linear;
         let mode = match (numerics.dissipation, linear, numerics.limiter) {
@@ -151,35 +199,43 @@ impl Url {
             (true, true, _) => riemann::LINEAR,
         };
         let volume = numerics.volume_dissipation > 0.0;
+        let conduction = thermal.filter(|t| t.conductivity > 0.0);
+        let bound = reference.is_bound_by_areas();
+        let areas = mode != riemann::OFF || volume || bound || conduction.is_some();
         Self {
             law,
             options: Options {
-                state: numerics.state,
                 mode,
                 venkatakrishnan: numerics.limiter == Limiter::Venkatakrishnan,
                 volume_dissipation: numerics.volume_dissipation,
                 linear,
+                thermal,
             },
             scratch: Scratch {
                 q: Array::new(layout, [0.0; 9]),
-                s: (mode != riemann::OFF || volume).then(|| Array::new(layout, [0.0; 9])),
+                s: areas.then(|| Array::new(layout, [0.0; 9])),
                 half_grad: matches!(mode, riemann::LINEAR | riemann::MINMOD)
                     .then(|| Array::new(layout, [0.0; 9])),
                 wave: Array::new(layout, [1.0; 2]),
                 sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
+                theta: thermal.map(|_| Array::new(layout, [1.0; 2])),
             },
+            conduction: conduction.map(|thermal| Conduction::new(layout, thermal)),
             rates: Rates {
                 force: Array::new(layout, [0.0; 3]),
                 grad_v: Array::new(layout, [0.0; 9]),
                 j_dissipation: volume.then(|| Array::new(layout, [0.0])),
+                heat: thermal.map(|_| Array::new(layout, [0.0])),
             },
         }
     }
 
-    /// Wave speeds of the linearised law [m/s].
+    /// Wave speeds of the linearised law [m/s]: adiabatic with heat.
     pub fn wave_speeds(&self) -> WaveSpeeds<f64> {
+        let thermal = self.options.thermal;
+        let heat = thermal.map_or(0.0, |t| t.adiabatic_stiffness() + t.softening());
         with_law!(self.law, law => WaveSpeeds {
-            pressure: law.pressure_wave_speed(),
+            pressure: (law.pressure_wave_speed().powi(2) + heat / law.density()).sqrt(),
             shear: law.shear_wave_speed(),
         })
     }
@@ -196,41 +252,119 @@ impl Url {
         reference: &Reference,
         slot: usize,
     ) -> Deformation<f64> {
-        self.total_of(&Kinematics::new(state, reference), slot)
+        Kinematics::new(state, reference).total((), slot)
     }
 
-    fn total_of(&self, kinematics: &Kinematics, slot: usize) -> Deformation<f64> {
-        match self.options.state {
-            StateMeasures::F => kinematics.total::<f64, 0, true>((), slot),
-            StateMeasures::Fj => kinematics.total::<f64, 1, true>((), slot),
-            StateMeasures::Fhj => kinematics.total::<f64, 2, true>((), slot),
+    /// Stress and energy of the particle in a slot, of its committed history.
+    pub fn point(&self, state: &State, reference: &Reference, slot: usize) -> Point {
+        let d = self.deformation(state, reference, slot);
+        self.law
+            .at(&d, &state.history_at(slot), self.thermal_at(state, slot))
+    }
+
+    /// Thermal constants and the entropy of the particle in a slot.
+    fn thermal_at(&self, state: &State, slot: usize) -> Option<(Thermal, f64)> {
+        let eta = state.eta.as_ref()?.get(slot)[0];
+        Some((self.options.thermal?, eta))
+    }
+
+    /// Temperature of the particle in a slot [K]; NaN of a body without heat.
+    pub fn temperature(&self, state: &State, reference: &Reference, slot: usize) -> f64 {
+        let d = self.deformation(state, reference, slot);
+        self.thermal_at(state, slot)
+            .map_or(f64::NAN, |(thermal, eta)| thermal.warmth(&d, eta).theta)
+    }
+
+    /// Temperature that the last evaluation found in a slot [K].
+    pub fn evaluated_temperature(&self, slot: usize) -> f64 {
+        let theta = self.scratch.theta.as_ref();
+        theta.map_or(f64::NAN, |theta| theta.get(slot)[0])
+    }
+
+    /// Heat that the particle in a slot takes up [W] at the evaluated rates while its temperature
+    /// changes at a rate [K/s]: theta d eta/dt.
+    pub fn heat_uptake(&self, state: &State, reference: &Reference, slot: usize, rate: f64) -> f64 {
+        let Some(thermal) = self.options.thermal else {
+            return 0.0;
+        };
+        let d = self.deformation(state, reference, slot);
+        let f = matrix(&state.f.get(slot));
+        let cof = cofactor(&f);
+        // Rate of ln J.
+        let dilation = double_dot(&matrix(&self.rates.grad_v.get(slot)), &cof) / dot(f[0], cof[0]);
+        let theta = self.evaluated_temperature(slot);
+        reference.volume.get(slot)[0] * thermal.uptake(&d, theta, rate, dilation)
+    }
+
+    /// Heat rate that a ledger counts [W]: what comes from outside. The linear law's entropy takes
+    /// heat up at the reference temperature, so that its energy changes by theta/theta_R of the heat
+    /// everywhere, conduction included.
+    pub fn heat_power(&self, external: f64) -> f64 {
+        match (&self.rates.heat, self.options.thermal) {
+            (Some(heat), Some(thermal)) if thermal.linear => {
+                let slots = (0..heat.particles()).map(Layout::slot);
+                slots
+                    .map(|s| heat.get(s)[0] * self.evaluated_temperature(s) / thermal.theta_r)
+                    .sum()
+            }
+            _ => external,
         }
     }
 
-    /// Rates of a state.
+    /// Sets the temperature [K] of the particle in a slot at its present deformation; the heat that
+    /// this takes [J].
+    pub fn set_temperature(
+        &self,
+        state: &mut State,
+        reference: &Reference,
+        slot: usize,
+        theta: f64,
+    ) -> f64 {
+        let d = self.deformation(state, reference, slot);
+        let (Some(eta), Some(thermal)) = (&mut state.eta, self.options.thermal) else {
+            return 0.0;
+        };
+        let before = thermal.warmth(&d, eta.get(slot)[0]).energy;
+        eta.set(slot, [thermal.entropy(&d, theta)]);
+        let after = thermal.warmth(&d, eta.get(slot)[0]).energy;
+        reference.volume.get(slot)[0] * (after - before)
+    }
+
+    /// Constants of a body with heat.
+    pub fn thermal(&self) -> Option<Thermal> {
+        self.options.thermal
+    }
+
+    /// Rates of a state. Of a law with a history, the state of a stage is `elapsed` [s] after the
+    /// step's start, whose history it carries; a state at a step's end has its own.
     ///
     /// # Errors
-    /// The first particle whose J is not positive and finite.
+    /// The first particle that is in trouble.
     pub fn evaluate(
         &mut self,
         state: &State,
         reference: &Reference,
+        elapsed: Option<f64>,
     ) -> std::result::Result<Evaluation, Breakdown> {
-        self.evaluate_on::<Vectors>(state, reference)
+        self.evaluate_on::<Vectors>(state, reference, elapsed)
     }
 
     fn evaluate_on<R: Runner>(
         &mut self,
         state: &State,
         reference: &Reference,
+        elapsed: Option<f64>,
     ) -> std::result::Result<Evaluation, Breakdown> {
         let mut total = Evaluation {
             length: f64::INFINITY,
+            conduction_step: f64::INFINITY,
             ..Evaluation::default()
         };
-        for point in self.points::<R>(state, reference) {
-            let (strain, kinetic) = point?;
-            total.strain += strain;
+        for point in self.points::<R>(state, reference, elapsed) {
+            let (stored, kinetic) = point?;
+            total.strain += stored.strain;
+            total.thermal += stored.thermal;
+            total.entropy += stored.entropy;
             total.kinetic += kinetic;
         }
         if self.options.venkatakrishnan
@@ -255,24 +389,45 @@ impl Url {
         if self.scratch.sigma_j.is_some() {
             total.dissipation += self.volume_rates::<R>(state, reference);
         }
+        if let Some(heat) = &mut self.rates.heat {
+            let input = ForceInput::new(state, reference, &self.scratch);
+            match (&mut self.conduction, &self.scratch.theta) {
+                (Some(conduction), Some(theta)) => {
+                    let kinematics = Kinematics::new(state, reference);
+                    (total.conduction, total.conduction_step) =
+                        conduction.rates::<R>(&input, &kinematics, theta, heat);
+                }
+                _ => heat.fill(0.0),
+            }
+        }
         Ok(total)
     }
 
-    /// Gradient and point passes; strain and kinetic energy by slab.
+    /// Gradient, law and point passes; what is stored, and the kinetic energy, by slab.
     fn points<R: Runner>(
         &mut self,
         state: &State,
         reference: &Reference,
-    ) -> Vec<std::result::Result<(f64, f64), Breakdown>> {
+        elapsed: Option<f64>,
+    ) -> Vec<std::result::Result<(Stored, f64), Breakdown>> {
         let Self {
             law,
             options,
             scratch,
             rates,
+            ..
         } = self;
         let v = state.v.components();
         let kinematics = Kinematics::new(state, reference);
-        let updated = reference.updated.is_some();
+        let density = law.density();
+        let heat = state.eta.as_ref().zip(options.thermal);
+        let inputs = LawInputs {
+            kinematics,
+            reference,
+            heat: heat.map(|(eta, thermal)| (eta.components()[0], thermal)),
+            history: state.history.as_ref().map(Array::components),
+            elapsed: elapsed.unwrap_or(0.0),
+        };
         let mut s = scratch.s.as_mut().map(|s| s.slabs_mut().into_iter());
         let mut half_grad = scratch
             .half_grad
@@ -282,49 +437,74 @@ impl Url {
             .sigma_j
             .as_mut()
             .map(|(s, _)| s.slabs_mut().into_iter());
+        let mut theta = scratch.theta.as_mut().map(|t| t.slabs_mut().into_iter());
         let slabs: Vec<_> = rates
             .grad_v
             .slabs_mut()
             .into_iter()
             .zip(scratch.q.slabs_mut())
             .zip(scratch.wave.slabs_mut())
-            .map(|((grad_v, q), wave)| {
-                let s = s.as_mut().and_then(Iterator::next);
-                let half_grad = half_grad.as_mut().and_then(Iterator::next);
-                let sigma_j = sigma_j.as_mut().and_then(Iterator::next).map(|[s]| s);
-                PointOutput {
-                    grad_v,
-                    q,
-                    s,
-                    half_grad,
-                    wave,
-                    sigma_j,
-                }
+            .map(|((grad_v, q), wave)| PointOutput {
+                grad_v,
+                q,
+                s: s.as_mut().and_then(Iterator::next),
+                half_grad: half_grad.as_mut().and_then(Iterator::next),
+                wave,
+                sigma_j: sigma_j.as_mut().and_then(Iterator::next).map(|[s]| s),
+                theta: theta.as_mut().and_then(Iterator::next),
             })
             .collect();
+        let law = *law;
         parallel::map_slabs(slabs, |slab, mut out| {
             gradient::<R>(reference, v, slab, &mut out.grad_v);
-            macro_rules! points {
-                ($law:expr, $($state:pat => $n:literal),*) => {
-                    match (options.state, updated) {
-                        $(($state, false) => R::run(Points::<_, $n, false> {
-                            law: $law, kinematics, reference, v, slab, out: &mut out,
-                        }),
-                        ($state, true) => R::run(Points::<_, $n, true> {
-                            law: $law, kinematics, reference, v, slab, out: &mut out,
-                        }),)*
-                    }
-                };
-            }
-            with_law!(*law, law => points!(
-                law, StateMeasures::F => 0, StateMeasures::Fj => 1, StateMeasures::Fhj => 2
-            ))
+            let stored = with_law!(law, law => {
+                stresses::<R, _>(law, inputs, elapsed.is_some(), slab, &mut out)
+            })?;
+            let kinetic = R::run(Points {
+                density,
+                kinematics,
+                reference,
+                v,
+                slab,
+                out: &mut out,
+            })?;
+            Ok((stored, kinetic))
         })
+    }
+
+    /// Plastic flow from the step's start over `elapsed` [s] at the present state: the history is
+    /// mapped, and the part of the plastic work that becomes heat raises the entropy.
+    pub fn commit(&self, state: &mut State, reference: &Reference, elapsed: f64) -> Plastic {
+        let Some(mut history) = state.history.take() else {
+            return Plastic::default();
+        };
+        let mut eta = state.eta.take();
+        let kinematics = Kinematics::new(state, reference);
+        let mut etas = eta.as_mut().map(|e| e.slabs_mut().into_iter());
+        let (law, thermal) = (self.law, self.options.thermal);
+        let slabs: Vec<_> = history
+            .slabs_mut()
+            .into_iter()
+            .map(|history| {
+                let eta = etas.as_mut().and_then(Iterator::next).map(|[e]| e);
+                (history, eta.zip(thermal))
+            })
+            .collect();
+        let flows = parallel::map_slabs(slabs, |slab, (history, heat)| {
+            with_law!(law, law => flow(Flow {
+                law, kinematics, reference, elapsed, slab, history, heat,
+            }))
+        });
+        state.history = Some(history);
+        state.eta = eta;
+        let mut total = Plastic::default();
+        flows.into_iter().for_each(|f| total += f);
+        total
     }
 
     /// Force pass; power of the dissipation and squared length by slab.
     fn forces<R: Runner>(&mut self, state: &State, reference: &Reference) -> Vec<(f64, f64)> {
-        let speeds = self.wave_speeds();
+        let (speeds, density) = (self.wave_speeds(), self.law.density());
         let Self {
             options,
             scratch,
@@ -337,7 +517,7 @@ impl Url {
                 ($pairs:expr, $($mode:ident),*) => {
                     match options.mode {
                         $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
-                            pairs: $pairs, input, speeds, slab, out,
+                            pairs: $pairs, input, speeds, density, slab, out,
                         }),)*
                         _ => unreachable!("four modes"),
                     }
@@ -366,7 +546,7 @@ impl Url {
         if options.linear {
             parallel::map_slabs(half_slope.slabs_mut(), |slab, out| {
                 with_pairs!(reference, pairs => R::run(HalfSlope {
-                    pairs, reference, kinematics, sigma, slab, out,
+                    pairs, reference, kinematics, field: sigma, slab, out,
                 }));
             });
         }
@@ -398,8 +578,10 @@ impl Url {
         );
         let j_rate = self.rates.j_dissipation.as_ref().map(|r| r.components()[0]);
         let density = self.law.density();
+        let heating = self.heating();
         let mut h = state.h.as_mut().map(|h| h.slabs_mut().into_iter());
         let mut j = state.j.as_mut().map(|j| j.slabs_mut().into_iter());
+        let mut eta = state.eta.as_mut().map(|e| e.slabs_mut().into_iter());
         let slabs: Vec<_> = state
             .x
             .slabs_mut()
@@ -412,6 +594,7 @@ impl Url {
                 f,
                 h: h.as_mut().and_then(Iterator::next),
                 j: j.as_mut().and_then(Iterator::next).map(|[j]| j),
+                eta: eta.as_mut().and_then(Iterator::next).map(|[e]| e),
             })
             .collect();
         parallel::map_slabs(slabs, |slab, out| {
@@ -421,6 +604,7 @@ impl Url {
                 force,
                 grad_v,
                 j_rate,
+                heating,
                 density,
                 keep,
                 take,
@@ -429,6 +613,15 @@ impl Url {
                 out,
             });
         });
+    }
+
+    /// What turns heat rates into rates of entropy.
+    fn heating(&self) -> Option<Heating<'_>> {
+        Some(Heating {
+            thermal: self.options.thermal?,
+            heat: self.rates.heat.as_ref()?.components()[0],
+            theta: self.scratch.theta.as_ref()?.components()[0],
+        })
     }
 
     /// Makes the current configuration the reference ([URL22] algorithm 1, steps 5 to 8): F_chi <-
@@ -462,7 +655,7 @@ impl Url {
             let (first, slices) = layout.slab_range(slab);
             let mut breakdown = None;
             for at in 0..slices * SLICE {
-                let total = self.total_of(&kinematics, first + at);
+                let total = kinematics.total::<f64>((), first + at);
                 store9(&total.f, &mut f_chi, at);
                 total.j.store(j_chi, at);
                 if let Some(h_chi) = &mut h_chi {
@@ -471,8 +664,12 @@ impl Url {
                 // Whatever an evaluation would refuse must not get into the reference.
                 let slot = first + at;
                 let mass = density * volume[slot];
-                breakdown = breakdown
-                    .or_else(|| inadmissible(&total, load3((), &velocity, slot), mass, slot));
+                let trouble = || {
+                    inadmissible(&total, 1.0)
+                        .or_else(|| immovable(load3((), &velocity, slot), mass))
+                };
+                breakdown =
+                    breakdown.or_else(|| trouble().map(|trouble| Breakdown { slot, trouble }));
             }
             breakdown
         });
@@ -484,8 +681,9 @@ impl Url {
         if let Err(slot) = reference.update() {
             reference.updated = Some(old);
             reference.rebuild().expect("it could be built before");
-            let jacobian = self.deformation(state, reference, slot).j;
-            return Err(Breakdown { slot, jacobian });
+            let ratio = self.deformation(state, reference, slot).j;
+            let trouble = Trouble::VolumeRatio(ratio);
+            return Err(Breakdown { slot, trouble });
         }
         state.f = Array::new(layout, flat(&IDENTITY));
         if let Some(h) = &mut state.h {
@@ -508,6 +706,50 @@ impl Url {
             + self.rates.force.bytes()
             + self.rates.grad_v.bytes()
             + self.rates.j_dissipation.as_ref().map_or(0, Array::bytes)
+            + s.theta.as_ref().map_or(0, Array::bytes)
+            + self.rates.heat.as_ref().map_or(0, Array::bytes)
+            + self.conduction.as_ref().map_or(0, Conduction::bytes)
+    }
+}
+
+/// Plastic flow in one slab; compiled only for the laws that have a history.
+fn flow<M: Material>(work: Flow<M>) -> Plastic {
+    if M::HISTORY {
+        vectorised(work)
+    } else {
+        Plastic::default()
+    }
+}
+
+/// The law pass of one slab, compiled for what the body has; with `flow` a history is mapped.
+fn stresses<'a, R: Runner, M: Material>(
+    law: M,
+    inputs: LawInputs<'a>,
+    flow: bool,
+    slab: usize,
+    out: &mut PointOutput<'a>,
+) -> std::result::Result<Stored, Breakdown> {
+    macro_rules! laws {
+        ($heat:literal, $flow:literal) => {
+            R::run(Laws::<M, $heat, $flow> {
+                law,
+                inputs,
+                slab,
+                out,
+            })
+        };
+    }
+    if M::HISTORY {
+        match (inputs.heat.is_some(), flow) {
+            (false, false) => laws!(false, false),
+            (true, false) => laws!(true, false),
+            (false, true) => laws!(false, true),
+            (true, true) => laws!(true, true),
+        }
+    } else if inputs.heat.is_some() {
+        laws!(true, false)
+    } else {
+        laws!(false, false)
     }
 }
 
@@ -524,7 +766,7 @@ fn gradient<'a, R: Runner>(
 }
 
 /// How the passes run: on vectors, or in the tests one particle at a time as the readable form.
-trait Runner {
+pub(super) trait Runner {
     fn run<W: Work>(work: W) -> W::Output;
 }
 
@@ -547,11 +789,7 @@ pub fn deform(state: &mut State, reference: &Reference) {
     });
     for slot in (0..layout.particles).map(Layout::slot) {
         let own = f.get(slot);
-        let m = [
-            [own[0], own[1], own[2]],
-            [own[3], own[4], own[5]],
-            [own[6], own[7], own[8]],
-        ];
+        let m = matrix(&own);
         let cof = cofactor(&m);
         state.f.set(slot, own);
         if let Some(h) = &mut state.h {
@@ -609,9 +847,10 @@ mod tests {
         let particles = Particles::new(&scene).expect("particles");
         let graph = Graph::new(&particles, scene.numerics.neighbours).expect("graph");
         let mut reference = Reference::new(&particles, &graph, &scene.numerics).expect("operators");
+        let (law, thermal) = Law::of(&scene);
+        let url = Url::new(&reference, law, thermal, &scene.numerics);
         let mut state =
-            crate::simulation::initial_state(&scene, &reference, &particles).expect("state");
-        let url = Url::new(&reference, Law::new(&scene.material), &scene.numerics);
+            crate::simulation::initial_state(&scene, &url, &reference, &particles).expect("state");
         url.update_reference(&mut state, &mut reference)
             .expect("a good deformation");
         (reference, state, url)
@@ -653,6 +892,11 @@ mod tests {
                 "numerics.reference_update=every_step",
             ],
             &[
+                "heat={\"specific_heat\": 1, \"reference_temperature\": 293, \"conductivity\": 10, \"gruneisen_coefficient\": 0.5, \"gruneisen_exponent\": 0.5}",
+                "initial.temperature=293 + 5*X - sin(Y)",
+                "numerics.reference_update=every_step",
+            ],
+            &[
                 "material={\"mooney_rivlin\": {\"density\": 1, \"youngs_modulus\": 3, \"poisson_ratio\": 0.2}}",
             ],
         ];
@@ -660,11 +904,11 @@ mod tests {
         for overrides in options {
             let (reference, state, mut url) = body(overrides);
             let wide = pool
-                .install(|| url.evaluate(&state, &reference))
+                .install(|| url.evaluate(&state, &reference, None))
                 .expect("a good state");
             let rates = |url: &Url| {
-                let j = url.rates.j_dissipation.clone();
-                (url.rates.force.clone(), url.rates.grad_v.clone(), j)
+                let (j, heat) = (url.rates.j_dissipation.clone(), url.rates.heat.clone());
+                (url.rates.force.clone(), url.rates.grad_v.clone(), j, heat)
             };
             let kept = rates(&url);
             let check = |again: std::result::Result<Evaluation, Breakdown>, url: &Url| {
@@ -677,12 +921,12 @@ mod tests {
                 );
             };
             url.rates.force = Array::new(reference.layout, [0.0; 3]);
-            let single = url.evaluate_on::<OneByOne>(&state, &reference);
+            let single = url.evaluate_on::<OneByOne>(&state, &reference, None);
             check(single, &url);
             #[cfg(target_arch = "x86_64")]
             if pulp::x86::V3::try_new().is_some() {
                 url.rates.force = Array::new(reference.layout, [0.0; 3]);
-                let narrow = url.evaluate_on::<Avx2>(&state, &reference);
+                let narrow = url.evaluate_on::<Avx2>(&state, &reference, None);
                 check(narrow, &url);
             }
         }
@@ -707,14 +951,15 @@ mod tests {
                 state.x.set(slot, mat_vec(&f, x));
             }
             deform(&mut state, &reference);
-            url.evaluate(&state, &reference).expect("a good state");
+            url.evaluate(&state, &reference, None)
+                .expect("a good state");
             let h = cofactor(&f);
             let at = Deformation {
                 f,
                 h,
                 j: dot(f[0], h[0]),
             };
-            let p = url.law().at(&at).first_piola;
+            let p = url.law().at(&at, &VIRGIN, None).first_piola;
             let scale = double_dot(&p, &p).sqrt();
             let (mut inside, mut edges, mut linear): (f64, f64, f64) = (0.0, 0.0, 0.0);
             for slot in slots() {
@@ -738,7 +983,8 @@ mod tests {
                     .v
                     .set(slot, mat_vec(&gradient, reference.x_initial.get(slot)));
             }
-            url.evaluate(&state, &reference).expect("a good state");
+            url.evaluate(&state, &reference, None)
+                .expect("a good state");
             for slot in slots() {
                 for (own, exact) in url.rates.grad_v.get(slot).iter().zip(flat(&gradient)) {
                     linear = linear.max((own - exact).abs());

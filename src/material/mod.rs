@@ -2,23 +2,55 @@
 
 mod mooney_rivlin;
 mod neo_hookean;
+mod thermal;
 
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
+pub use thermal::Thermal;
 
 use crate::lane::Lane;
-use crate::math::{Mat3, mat_mul_t, scale9};
+use crate::math::{Mat3, cofactor, dot, largest_eigenvalue, mat_mul_t, scale9};
 
-/// A hyperelastic law W(F, H, J).
+/// History of one particle: the inverse plastic right Cauchy-Green tensor C_p^-1 (initial
+/// configuration; xx, yy, zz, xy, xz, yz) and the equivalent plastic strain.
+pub type History<T> = [T; 7];
+
+/// History of a virgin particle.
+pub const VIRGIN: History<f64> = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+
+/// A law at one point: energy W(F, H, J), and plastic flow where it has a history.
 pub trait Material: Copy + Send + Sync {
+    /// Whether particles carry a [`History`]; without it none is stored.
+    const HISTORY: bool = false;
+    /// Whether the law is the linearised one, which knows no rotation: its temperature is linear in
+    /// the entropy ([URL23] 7.1).
+    const LINEAR: bool = false;
     /// Density rho_R [kg/m^3], initial.
     fn density(&self) -> f64;
     /// Speed of pressure waves of the linearised law [m/s], sqrt((lambda + 2 mu)/rho_R).
     fn pressure_wave_speed(&self) -> f64;
     /// Speed of shear waves of the linearised law [m/s], sqrt(mu/rho_R).
     fn shear_wave_speed(&self) -> f64;
-    /// First Piola-Kirchhoff stress, its volumetric conjugate, and the energy.
-    fn stress<T: Lane>(&self, f: &Mat3<T>, h: &Mat3<T>, j: T) -> Stress<T>;
+    /// Stress and energy at one point.
+    ///
+    /// With `FLOW` the history, which holds that of the step's start, is mapped to the end of
+    /// `elapsed` [s] at the temperature `theta` [K]; without it the history is frozen and the
+    /// response elastic.
+    fn stress<T: Lane, const FLOW: bool>(
+        &self,
+        d: &Deformation<T>,
+        theta: T,
+        history: &mut History<T>,
+        elapsed: T,
+    ) -> Stress<T>;
+}
+
+/// Smallest stretch of F: 1/lambda^2 is the largest eigenvalue of F^-T F^-1. A hyperelastic body's
+/// fastest wave crosses a pair as if the pair were shorter by this factor ([URL22] 63).
+#[inline(always)]
+fn smallest_stretch<T: Lane>(f: &Mat3<T>) -> T {
+    let cof = cofactor(f);
+    dot(f[0], cof[0]) / largest_eigenvalue(&mat_mul_t(&cof, &cof)).sqrt()
 }
 
 /// Total deformation of one point: initial to current.
@@ -41,6 +73,10 @@ pub struct Stress<T> {
     pub sigma_j: T,
     /// W [J/m^3], per unit initial volume.
     pub energy: T,
+    /// Plastic work of this flow [J/m^3], per unit initial volume.
+    pub dissipation: T,
+    /// What divides the linear wave speed: the smallest stretch of a hyperelastic law.
+    pub stretch: T,
 }
 
 /// Elastic constants of the linearised law.
@@ -61,6 +97,13 @@ impl Moduli {
             mu: youngs_modulus / (2.0 * (1.0 + poisson_ratio)),
             kappa: youngs_modulus / (3.0 * (1.0 - 2.0 * poisson_ratio)),
             rho,
+        }
+    }
+    /// The same with a smaller bulk modulus.
+    fn softened(self, by: f64) -> Self {
+        Self {
+            kappa: self.kappa - by,
+            ..self
         }
     }
     fn pressure_wave_speed(&self) -> f64 {
@@ -92,17 +135,27 @@ macro_rules! with_law {
 pub(crate) use with_law;
 
 impl Law {
-    /// The law of a scene.
-    pub fn new(material: &crate::scene::Material) -> Self {
+    /// The law of a scene's body, and its thermodynamics if it has heat. The moduli of the scene are
+    /// the isothermal ones at rest, so a law leaves out what the thermal pressure adds to them.
+    pub fn of(scene: &crate::scene::Scene) -> (Self, Option<Thermal>) {
+        let law = Self::new(&scene.material, 0.0);
+        match &scene.heat {
+            None => (law, None),
+            Some(heat) => {
+                let softening = Thermal::new(heat, &law).softening();
+                let law = Self::new(&scene.material, softening);
+                (law, Some(Thermal::new(heat, &law)))
+            }
+        }
+    }
+    fn new(material: &crate::scene::Material, softening: f64) -> Self {
         use crate::scene::Material as M;
         match material {
-            M::NeoHookean(m) => Law::NeoHookean(NeoHookean(Moduli::new(
-                m.youngs_modulus,
-                m.poisson_ratio,
-                m.density,
-            ))),
+            M::NeoHookean(m) => Law::NeoHookean(NeoHookean(
+                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density).softened(softening),
+            )),
             M::MooneyRivlin(m) => Law::MooneyRivlin(MooneyRivlin::new(
-                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density),
+                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density).softened(softening),
                 m.area_share,
             )),
         }
@@ -111,9 +164,39 @@ impl Law {
     pub fn density(&self) -> f64 {
         with_law!(*self, law => law.density())
     }
-    /// Stresses and energy at one point.
-    pub fn at(&self, d: &Deformation<f64>) -> Point {
-        let stress = with_law!(*self, law => law.stress(&d.f, &d.h, d.j));
+    /// Modulus of pressure waves at rest [Pa].
+    pub fn wave_modulus(&self) -> f64 {
+        with_law!(*self, law => law.density() * law.pressure_wave_speed().powi(2))
+    }
+    /// See [`Material::LINEAR`].
+    pub fn is_linear(&self) -> bool {
+        fn of<M: Material>(_: M) -> bool {
+            M::LINEAR
+        }
+        with_law!(*self, law => of(law))
+    }
+    /// Whether particles carry a history.
+    pub fn has_history(&self) -> bool {
+        fn of<M: Material>(_: M) -> bool {
+            M::HISTORY
+        }
+        with_law!(*self, law => of(law))
+    }
+    /// Stresses and energy at one point of a committed history; with heat at an entropy.
+    pub fn at(
+        &self,
+        d: &Deformation<f64>,
+        history: &History<f64>,
+        heat: Option<(Thermal, f64)>,
+    ) -> Point {
+        let warmth = heat.map(|(thermal, eta)| (thermal, thermal.warmth(d, eta)));
+        let theta = warmth.map_or(0.0, |(_, w)| w.theta);
+        let mut history = *history;
+        let mut stress =
+            with_law!(*self, law => law.stress::<f64, false>(d, theta, &mut history, 0.0));
+        if let Some((thermal, w)) = warmth {
+            thermal.couple(d, &w, &mut stress);
+        }
         Point {
             first_piola: stress.p,
             cauchy: scale9(1.0 / d.j, &mat_mul_t(&stress.p, &d.f)),
@@ -142,7 +225,12 @@ mod tests {
     fn check(law: impl Material, moduli: Moduli) {
         let all = |f: &Mat3<f64>| {
             let h = cofactor(f);
-            law.stress(f, &h, dot(f[0], h[0]))
+            let d = Deformation {
+                f: *f,
+                h,
+                j: dot(f[0], h[0]),
+            };
+            law.stress::<f64, false>(&d, 0.0, &mut VIRGIN.clone(), 0.0)
         };
         let rest = all(&IDENTITY);
         assert!(double_dot(&rest.p, &rest.p).sqrt() < 1e-9 * moduli.mu);

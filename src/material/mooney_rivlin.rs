@@ -1,6 +1,6 @@
 //! Mooney-Rivlin law of [URL22] eqs. 5 to 8.
 
-use super::{Material, Moduli, Stress};
+use super::{Deformation, History, Material, Moduli, Stress, smallest_stretch};
 use crate::lane::Lane;
 use crate::math::*;
 
@@ -36,7 +36,15 @@ impl Material for MooneyRivlin {
     }
     /// [URL22] eqs. 5 to 8.
     #[inline(always)]
-    fn stress<T: Lane>(&self, f: &Mat3<T>, h: &Mat3<T>, j: T) -> Stress<T> {
+    fn stress<T: Lane, const FLOW: bool>(
+        &self,
+        d: &Deformation<T>,
+        _: T,
+        _: &mut History<T>,
+        _: T,
+    ) -> Stress<T> {
+        let Deformation { f, h, j } = d;
+        let j = *j;
         let token = j.token();
         let (zeta, xi, kappa) = (
             T::splat(token, self.zeta),
@@ -57,6 +65,8 @@ impl Material for MooneyRivlin {
         let sigma_j = distortion.mul_add(inverse_j, kappa * volumetric);
         let rest = T::splat(token, 3.0 * (self.zeta + 3f64.sqrt() * self.xi));
         Stress {
+            dissipation: T::splat(token, 0.0),
+            stretch: smallest_stretch(f),
             p: axpy9(&add9(&sigma_f, &tensor_cross(&sigma_h, f)), sigma_j, h),
             sigma_j,
             energy: zeta * j_two_thirds * ff + xi_j2 * hh * root_hh - rest

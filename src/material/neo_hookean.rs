@@ -1,6 +1,6 @@
 //! Neo-Hookean law: [URL22] eq. 5 with zeta = mu/2, xi = 0.
 
-use super::{Material, Moduli, Stress};
+use super::{Deformation, History, Material, Moduli, Stress, smallest_stretch};
 use crate::lane::Lane;
 use crate::math::*;
 
@@ -20,7 +20,15 @@ impl Material for NeoHookean {
     }
     /// [URL22] eqs. 5 to 8.
     #[inline(always)]
-    fn stress<T: Lane>(&self, f: &Mat3<T>, h: &Mat3<T>, j: T) -> Stress<T> {
+    fn stress<T: Lane, const FLOW: bool>(
+        &self,
+        d: &Deformation<T>,
+        _: T,
+        _: &mut History<T>,
+        _: T,
+    ) -> Stress<T> {
+        let Deformation { f, h, j } = d;
+        let j = *j;
         let token = j.token();
         let (mu, kappa) = (T::splat(token, self.0.mu), T::splat(token, self.0.kappa));
         let j_third = j.inverse_cbrt();
@@ -30,6 +38,8 @@ impl Material for NeoHookean {
         let mu_j = mu * j_two_thirds;
         let sigma_j = kappa * volumetric - mu_j * ff / (T::splat(token, 3.0) * j);
         Stress {
+            dissipation: T::splat(token, 0.0),
+            stretch: smallest_stretch(f),
             p: axpy9(&scale9(mu_j, f), sigma_j, h),
             sigma_j,
             energy: T::splat(token, 0.5)

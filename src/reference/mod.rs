@@ -28,7 +28,7 @@ use crate::layout::{Array, Layout};
 use crate::math::*;
 use crate::neighbours::Graph;
 use crate::parallel;
-use crate::particles::Particles;
+use crate::particles::{Mesh, Particles, Shape};
 use crate::scene::{Numerics, Operators, ReferenceUpdate, Weights};
 
 use pairs::{Closed, Lean, StoredVectors};
@@ -40,7 +40,7 @@ use updated::{Kernels, PulledBackVectors, PulledBackWeights, SmoothingLength};
 
 /// Tolerance of the closure and most iterations of a repair at the start, and at updates, which take
 /// what they get.
-const AT_START: (f64, usize) = (1e-9, 5000);
+const AT_START: (f64, usize) = (1e-12, 20_000);
 const AT_UPDATES: (f64, usize) = (1e-6, 50);
 
 /// Fields of an updated reference; a simulation that never updates has none of them.
@@ -185,6 +185,9 @@ impl Reference {
             smoothing_factor: numerics.smoothing_factor,
         };
         this.initial_weights(particles, graph, &volumes);
+        if operators == Operators::Mesh {
+            this.stored = Some(this.of_mesh(particles)?);
+        }
         let place = |slot: usize| {
             let i = slot - Layout::FIRST;
             (particles.caller(i), Some(particles.positions[i]))
@@ -242,8 +245,9 @@ impl Reference {
             for &b in graph.of(a) {
                 let (k, back) = (weight(a, b), weight(b as usize, a as u32));
                 symmetric &= k == back;
-                let pair = self.slices.pair(a, b as usize);
-                self.slices.weights_mut()[pair] = k;
+                if let Some(pair) = self.slices.pair(a, b as usize) {
+                    self.slices.weights_mut()[pair] = k;
+                }
             }
         }
         if !symmetric {
@@ -252,12 +256,48 @@ impl Reference {
                 for &b in graph.of(a) {
                     let (k, back) = (weight(a, b), weight(b as usize, a as u32));
                     let r = sub3(particles.positions[b as usize], particles.positions[a]);
-                    let pair = self.slices.pair(a, b as usize);
-                    stored.set(pair, scale3(k, r), scale3(-back, r));
+                    if let Some(pair) = self.slices.pair(a, b as usize) {
+                        stored.add(pair, scale3(k, r), scale3(-back, r));
+                    }
                 }
             }
             self.stored = Some(stored);
         }
+    }
+
+    /// g_ab = C_ab = 2 int N_a grad N_b dV of the mesh.
+    fn of_mesh(&self, particles: &Particles) -> Result<StoredVectors> {
+        let Shape::Mesh(mesh) = &particles.shape else {
+            return Err(Error::scene(
+                "numerics.operators",
+                "the particles form a lattice, not a mesh: leave this out, or give the box a jitter \
+                 of 0",
+            ));
+        };
+        let mut stored = StoredVectors::new(&self.slices);
+        for cell in &mesh.cells {
+            let c = Mesh::cell_operators(cell, &particles.positions);
+            for (i, &a) in cell.nodes().iter().enumerate() {
+                for (j, &b) in cell.nodes().iter().enumerate() {
+                    if i == j {
+                        continue;
+                    }
+                    let pair = self.slices.pair(a as usize, b as usize).ok_or_else(|| {
+                        Error::scene(
+                            "numerics.neighbours",
+                            "the operators of the mesh need all particles that share a cell as \
+                             neighbours: set 26",
+                        )
+                        .at_particle(
+                            particles.caller(a as usize),
+                            Some(particles.positions[a as usize]),
+                        )
+                    })?;
+                    stored.add(pair, c[i][j], c[j][i]);
+                }
+            }
+        }
+        Ok(stored)
     }
 
     /// Repairs the operators of the initial configuration; a message and a slot where that fails.
@@ -325,6 +365,11 @@ impl Reference {
     /// What the repair of the initial operators took, if they are repaired.
     pub fn repair(&self) -> Option<&Repair> {
         self.closed.as_ref().map(|c| &c.report)
+    }
+
+    /// Whether the stable step follows from the areas of the pairs too: all but kernels on a lattice.
+    pub fn is_bound_by_areas(&self) -> bool {
+        !matches!(self.pair_vectors(), Pairs::Lean(_))
     }
 
     /// The pair vectors now.
@@ -548,9 +593,10 @@ impl Reference {
 /// The operators of a body: the scene's choice, or the kernel's where particles form a lattice, on
 /// which they close, and where weights are as printed; repaired ones elsewhere.
 fn operators(particles: &Particles, numerics: &Numerics) -> Operators {
-    numerics
-        .operators
-        .unwrap_or(Operators::Kernel)
+    numerics.operators.unwrap_or(match particles.shape {
+        Shape::Mesh(_) if numerics.weights == Weights::Unit => Operators::Repaired,
+        _ => Operators::Kernel,
+    })
 }
 
 /// Half of each volume stays, half goes to the neighbours in equal shares: small volumes next to

@@ -8,6 +8,8 @@ use crate::math::*;
 
 /// Pair vectors g_ab and g_ba of a pair.
 pub trait PairVectors: Copy + Sync {
+    /// Whether the step follows from the areas of the pairs too, not from their distances alone.
+    const BOUND_BY_AREAS: bool = true;
     /// What is read once per particle.
     type Centre<T: Lane>: Copy;
     /// Reads it.
@@ -30,6 +32,8 @@ pub struct Lean<'a> {
 }
 
 impl PairVectors for Lean<'_> {
+    /// On a lattice the shortest distance is the stricter bound.
+    const BOUND_BY_AREAS: bool = false;
     type Centre<T: Lane> = Vec3<T>;
     #[inline(always)]
     fn centre<T: Lane>(&self, token: T::Token, a: usize) -> Vec3<T> {
@@ -130,11 +134,11 @@ impl StoredVectors {
             ba: std::array::from_fn(|c| bytemuck::must_cast_slice(&self.ba[c][..])),
         }
     }
-    /// Sets g_ab and g_ba of a pair.
-    pub fn set(&mut self, pair: usize, ab: [f64; 3], ba: [f64; 3]) {
+    /// Adds to g_ab and g_ba of a pair.
+    pub fn add(&mut self, pair: usize, ab: [f64; 3], ba: [f64; 3]) {
         for c in 0..3 {
-            self.ab[c][pair / SLICE].0[pair % SLICE] = ab[c];
-            self.ba[c][pair / SLICE].0[pair % SLICE] = ba[c];
+            self.ab[c][pair / SLICE].0[pair % SLICE] += ab[c];
+            self.ba[c][pair / SLICE].0[pair % SLICE] += ba[c];
         }
     }
     /// Components of g_ab, then of g_ba, for each slab.

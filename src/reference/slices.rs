@@ -109,15 +109,14 @@ impl Slices {
             + std::mem::size_of_val(&self.start[..])
     }
 
-    /// Pair index of an existing pair.
-    pub(super) fn pair(&self, a: usize, b: usize) -> usize {
+    /// Pair index of two neighbours.
+    pub(super) fn pair(&self, a: usize, b: usize) -> Option<usize> {
         let (slice, lane) = (a / SLICE, a % SLICE);
         let range = self.start[slice]..self.start[slice + 1];
         let base = (Layout::slot(b) - lane) as u32;
-        let at = self.base[range.clone()]
-            .binary_search(&base)
-            .expect("pair in its slice");
-        (range.start + at) * SLICE + lane
+        let at = self.base[range.clone()].binary_search(&base).ok()?;
+        let pair = (range.start + at) * SLICE + lane;
+        Some(pair)
     }
 }
 

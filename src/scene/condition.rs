@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::validate::require;
-use super::value::{Scalar, Vector, VectorFunction, below};
+use super::value::{Scalar, ScalarFunction, Vector, VectorFunction, below};
 use crate::error::{Error, Result};
 
 /// Conditions on one patch: at most one support, and any loads.
@@ -23,6 +23,34 @@ pub struct Condition {
     /// Follower pressure per unit current area, positive in compression [Pa].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure: Option<Scalar>,
+    /// Heat flux into the body per unit initial area [W/m^2].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heat_flux: Option<Scalar>,
+    /// Convection; it adds to the heat flux.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub convection: Option<Convection>,
+    /// Prescribed absolute temperature [K]. A patch without a condition for heat is adiabatic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<Scalar>,
+}
+
+/// Convection: heat flows in at coefficient (ambient temperature - temperature) per unit initial area.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Convection {
+    /// Heat transfer coefficient [W/(m^2 K)].
+    pub coefficient: Scalar,
+    /// Absolute temperature of the surroundings [K].
+    pub ambient_temperature: Scalar,
+}
+
+impl Condition {
+    /// The first condition for heat, by its key.
+    pub(super) fn heat(&self) -> Option<&'static str> {
+        (self.heat_flux.as_ref().map(|_| "heat_flux"))
+            .or(self.convection.as_ref().map(|_| "convection"))
+            .or(self.temperature.as_ref().map(|_| "temperature"))
+    }
 }
 
 /// Homogeneous supports, by the normal of the patch in the initial configuration.
@@ -47,6 +75,9 @@ pub struct Initial {
     /// Displacement [m]; the deformation gradient follows from it by the discrete gradient.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displacement: Option<Vector>,
+    /// Temperature [K]; needs the section `heat`, whose reference temperature is the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<Scalar>,
 }
 
 pub(super) fn validate(path: &str, condition: &Condition) -> Result<()> {
@@ -61,14 +92,63 @@ pub(super) fn validate(path: &str, condition: &Condition) -> Result<()> {
     if let Some(traction) = &condition.traction {
         load(&format!("{path}.traction"), traction)?;
     }
-    if let Some(pressure) = &condition.pressure {
-        let place = format!("{path}.pressure");
-        pressure.compile().map_err(|e| below(&place, e))?;
+    for (name, value) in [
+        ("pressure", &condition.pressure),
+        ("heat_flux", &condition.heat_flux),
+    ] {
+        if let Some(value) = value {
+            scalar(&format!("{path}.{name}"), value, |_| true, "")?;
+        }
+    }
+    if let Some(convection) = &condition.convection {
+        let path = format!("{path}.convection");
+        scalar(
+            &format!("{path}.coefficient"),
+            &convection.coefficient,
+            |h| h >= 0.0,
+            "a heat transfer coefficient is not negative",
+        )?;
+        absolute(
+            &format!("{path}.ambient_temperature"),
+            &convection.ambient_temperature,
+        )?;
+    }
+    if let Some(temperature) = &condition.temperature {
+        absolute(&format!("{path}.temperature"), temperature)?;
+    }
+    if condition.temperature.is_some() {
+        let flow = Condition {
+            temperature: None,
+            ..condition.clone()
+        };
+        if let Some(name) = flow.heat() {
+            return Err(Error::scene(
+                format!("{path}.{name}"),
+                format!(
+                    "a patch has either a prescribed `temperature` or a `{name}`, not both: \
+                     the temperature settles how much heat flows"
+                ),
+            ));
+        }
     }
     Ok(())
 }
 
 pub(super) fn initial(initial: &Initial) -> Result<()> {
+    if let Some(temperature) = &initial.temperature {
+        let path = "initial.temperature";
+        require(
+            matches!(temperature, Scalar::Constant(_) | Scalar::Expression(_)),
+            path,
+            "an initial temperature is a number or an expression in X, Y and Z",
+        )?;
+        let function = temperature.compile().map_err(|e| below(path, e))?;
+        require(
+            !function.depends_on_time(),
+            path,
+            "an initial value cannot depend on t",
+        )?;
+    }
     for (name, field) in [
         ("velocity", &initial.velocity),
         ("displacement", &initial.displacement),
@@ -99,6 +179,39 @@ pub(super) fn initial(initial: &Initial) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// An absolute temperature [K].
+pub(super) fn absolute(path: &str, value: &Scalar) -> Result<ScalarFunction> {
+    scalar(
+        path,
+        value,
+        |theta| theta > 0.0,
+        "an absolute temperature is above 0 K",
+    )
+}
+
+/// Compiles a scalar; what is known of its values before a run must be admissible.
+fn scalar(
+    path: &str,
+    value: &Scalar,
+    admissible: impl Fn(f64) -> bool,
+    why: &str,
+) -> Result<ScalarFunction> {
+    let function = value.compile().map_err(|e| below(path, e))?;
+    let known: Vec<(String, f64)> = match (value, &function) {
+        (Scalar::External { external, .. }, _) => vec![(format!("{path}.external"), *external)],
+        (Scalar::Table { table }, _) => {
+            let place = |(i, v): (usize, &f64)| (format!("{path}.table.value[{i}]"), *v);
+            table.value.iter().enumerate().map(place).collect()
+        }
+        (_, ScalarFunction::Constant(v)) => vec![(path.to_owned(), *v)],
+        _ => Vec::new(),
+    };
+    for (place, v) in known {
+        require(admissible(v), &place, &format!("{why}, but this is {v}"))?;
+    }
+    Ok(function)
 }
 
 fn compiled(path: &str, vector: &Vector) -> Result<VectorFunction> {

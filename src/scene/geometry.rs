@@ -39,6 +39,51 @@ pub struct BoxGeometry {
     pub max: [f64; 3],
     /// Particle spacing [m], one number or one per axis; it is adjusted to divide each edge evenly.
     pub spacing: Spacing,
+    /// Graded instead of even spacing, by axis; for a single box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grading: Option<AxisGrading>,
+    /// Moves the particles inside the box off the lattice; for a single box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub jitter: Option<Jitter>,
+}
+
+/// Graded spacing by axis; an axis without an entry is divided evenly.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AxisGrading {
+    /// Along X.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x: Option<Grading>,
+    /// Along Y.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub y: Option<Grading>,
+    /// Along Z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z: Option<Grading>,
+}
+
+/// Graded spacing along an axis: a ratio, or the places of all particles.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Grading {
+    /// The last spacing over the first; between them the spacing grows geometrically.
+    Ratio(#[schemars(extend("exclusiveMinimum" = 0))] f64),
+    /// Where the particles are, as fractions of the length: increasing from 0 to 1. They replace the
+    /// number that a spacing or a number of divisions asks for.
+    Fractions(Vec<f64>),
+}
+
+/// Particles moved off their lattice, the same on every machine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Jitter {
+    /// Largest displacement along each axis, as a fraction of the spacing; below 0.5. Particles on the
+    /// surface stay.
+    #[schemars(extend("minimum" = 0, "exclusiveMaximum" = 0.5))]
+    pub fraction: f64,
+    /// Another seed, other displacements.
+    #[serde(default)]
+    pub seed: u32,
 }
 
 /// One spacing for all axes, or one per axis [m].
@@ -82,6 +127,78 @@ impl<'de> Deserialize<'de> for Spacing {
             }
         }
         deserializer.deserialize_any(Visitor)
+    }
+}
+
+impl<'de> Deserialize<'de> for Grading {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> de::Visitor<'de> for Visitor {
+            type Value = Grading;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the ratio of the last spacing to the first, or a list of fractions from 0 to 1")
+            }
+            value::visit_numbers!(Grading::Ratio);
+            fn visit_seq<A: de::SeqAccess<'de>>(
+                self,
+                seq: A,
+            ) -> std::result::Result<Grading, A::Error> {
+                Deserialize::deserialize(SeqAccessDeserializer::new(seq)).map(Grading::Fractions)
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+impl Grading {
+    /// Where the particles of `cells` divisions are, from 0 to 1; even without a grading.
+    pub(crate) fn fractions(grading: Option<&Self>, cells: usize) -> Vec<f64> {
+        let even = || (0..=cells).map(|i| i as f64 / cells as f64).collect();
+        match grading {
+            Some(Self::Fractions(fractions)) => fractions.clone(),
+            Some(Self::Ratio(ratio)) if cells > 1 && *ratio != 1.0 => {
+                // Spacings q^i with q^(cells - 1) = ratio, over their sum.
+                let q = ratio.powf(1.0 / (cells - 1) as f64);
+                let mut fractions: Vec<f64> = (0..=cells)
+                    .map(|i| (q.powi(i as i32) - 1.0) / (q.powi(cells as i32) - 1.0))
+                    .collect();
+                fractions[cells] = 1.0;
+                fractions
+            }
+            _ => even(),
+        }
+    }
+    /// Number of divisions, given how many there are without a grading.
+    pub(crate) fn cells(grading: Option<&Self>, cells: f64) -> f64 {
+        match grading {
+            Some(Self::Fractions(fractions)) => fractions.len() as f64 - 1.0,
+            _ => cells,
+        }
+    }
+}
+
+impl AxisGrading {
+    /// By axis.
+    pub fn per_axis(&self) -> [Option<&Grading>; 3] {
+        [self.x.as_ref(), self.y.as_ref(), self.z.as_ref()]
+    }
+}
+
+impl BoxGeometry {
+    /// Cells along an axis, as a number that may be too large for an integer.
+    pub(crate) fn cells(&self, axis: usize) -> f64 {
+        let even = ((self.max[axis] - self.min[axis]) / self.spacing.per_axis()[axis])
+            .round()
+            .max(1.0);
+        Grading::cells(self.graded(axis), even)
+    }
+    /// Grading along an axis.
+    pub(crate) fn graded(&self, axis: usize) -> Option<&Grading> {
+        self.grading.as_ref().and_then(|g| g.per_axis()[axis])
+    }
+    /// Whether its particles form a lattice.
+    pub(crate) fn is_lattice(&self) -> bool {
+        self.grading.is_none() && self.jitter.is_none()
     }
 }
 
@@ -131,15 +248,79 @@ pub(super) fn validate(geometry: &Geometry) -> Result<()> {
         if let Some(name) = name {
             valid_name(&path, name)?;
         }
-        lattice_box(&path, b)?;
+        box_shape(&path, b)?;
+        for (set, what) in [
+            (b.grading.is_some(), "grading"),
+            (b.jitter.is_some(), "jitter"),
+        ] {
+            require(
+                name.is_none() || !set,
+                &format!("{path}.{what}"),
+                "a union of boxes is one lattice: only a single box (geometry.box) takes this; \
+                 for other shapes use a mesh",
+            )?;
+        }
     }
     Ok(())
+}
+
+fn grading(path: &str, grading: &Grading) -> Result<()> {
+    match grading {
+        Grading::Ratio(ratio) => {
+            positive(path, *ratio)?;
+            require(
+                (1e-3..=1e3).contains(ratio),
+                path,
+                &format!("expected a ratio from 0.001 to 1000 instead of {ratio}"),
+            )
+        }
+        Grading::Fractions(fractions) => {
+            finite(path, fractions)?;
+            require(
+                fractions.len() >= 2
+                    && fractions[0] == 0.0
+                    && fractions[fractions.len() - 1] == 1.0,
+                path,
+                "expected fractions of the length that begin with 0 and end with 1",
+            )?;
+            match fractions.windows(2).position(|w| w[0] >= w[1]) {
+                None => Ok(()),
+                Some(i) => Err(Error::scene(
+                    format!("{path}[{}]", i + 1),
+                    format!(
+                        "expected more than the fraction before, {}, instead of {}",
+                        fractions[i],
+                        fractions[i + 1]
+                    ),
+                )),
+            }
+        }
+    }
 }
 
 fn box_path(name: Option<&str>) -> String {
     name.map_or("geometry.box".to_owned(), |name| {
         key("geometry.boxes", name)
     })
+}
+
+fn box_shape(path: &str, b: &BoxGeometry) -> Result<()> {
+    if let Some(jitter) = &b.jitter {
+        require(
+            (0.0..0.5).contains(&jitter.fraction),
+            &format!("{path}.jitter.fraction"),
+            &format!(
+                "expected 0 or more and less than 0.5 instead of {}: beyond it cells invert",
+                jitter.fraction
+            ),
+        )?;
+    }
+    for axis in 0..3 {
+        if let Some(g) = b.graded(axis) {
+            grading(&format!("{path}.grading.{}", ["x", "y", "z"][axis]), g)?;
+        }
+    }
+    lattice_box(path, b)
 }
 
 fn lattice_box(path: &str, b: &BoxGeometry) -> Result<()> {
@@ -220,9 +401,7 @@ pub(super) fn capacity(
     // In f64, as a tiny spacing overflows any integer.
     let counts = geometry.boxes().into_iter().map(|(name, b)| {
         let h = b.spacing.per_axis();
-        let count: f64 = (0..3)
-            .map(|a| ((b.max[a] - b.min[a]) / h[a]).round().max(1.0) + 1.0)
-            .product();
+        let count: f64 = (0..3).map(|a| b.cells(a) + 1.0).product();
         let pairs = match neighbours {
             Neighbours::Lattice(_) => 0.0,
             Neighbours::Radius { radius } => {
@@ -288,6 +467,8 @@ mod tests {
             min: [0.0; 3],
             max: [1.0; 3],
             spacing: Spacing::Uniform(0.1),
+            grading: None,
+            jitter: None,
         });
         let need = 1331.0 * BYTES_PER_PARTICLE;
         capacity(&geometry, Neighbours::Lattice(18), None).unwrap();

@@ -6,6 +6,7 @@
 mod condition;
 mod expression;
 mod geometry;
+mod heat;
 mod material;
 mod numerics;
 mod parse;
@@ -21,9 +22,10 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use condition::{Condition, Initial, Support};
+pub use condition::{Condition, Convection, Initial, Support};
 pub use expression::Expression;
-pub use geometry::{BoxGeometry, Geometry, PatchSelection, Spacing};
+pub use geometry::{AxisGrading, BoxGeometry, Geometry, Grading, Jitter, PatchSelection, Spacing};
+pub use heat::Heat;
 pub use material::{Material, MooneyRivlin, NeoHookean};
 pub use numerics::{
     Limiter, Neighbours, Numerics, Operators, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
@@ -44,6 +46,9 @@ pub struct Scene {
     pub geometry: Geometry,
     /// The constitutive law of the body.
     pub material: Material,
+    /// Heat; without it the body is isothermal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heat: Option<Heat>,
     /// Additional named patches; every named face of the geometry is a patch already.
     #[serde(default)]
     pub patches: BTreeMap<String, PatchSelection>,

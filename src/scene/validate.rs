@@ -1,6 +1,6 @@
 //! What a well-formed scene must satisfy beyond its shape.
 
-use super::{Output, Scene, VectorFunction, condition, geometry, material, numerics};
+use super::{Output, Scene, VectorFunction, condition, geometry, heat, material, numerics};
 use crate::error::{Error, Result};
 use crate::fields::{FIELDS, FieldInfo};
 
@@ -16,6 +16,9 @@ impl Scene {
     pub fn validate(&self) -> Result<()> {
         geometry::validate(&self.geometry)?;
         material::validate(&self.material)?;
+        if let Some(heat) = &self.heat {
+            heat::validate(heat)?;
+        }
         self.patches_and_conditions()?;
         if let Some(force) = &self.body_force {
             let function = condition::load("body_force", force)?;
@@ -26,6 +29,11 @@ impl Scene {
             )?;
         }
         condition::initial(&self.initial)?;
+        require(
+            self.heat.is_some() || self.initial.temperature.is_none(),
+            "initial.temperature",
+            "the body has no temperature: add a section `heat`",
+        )?;
         numerics::validate(&self.numerics)?;
         self.probes_inside()?;
         positive("time.end", self.time.end)?;
@@ -59,6 +67,13 @@ impl Scene {
                 ));
             }
             condition::validate(&path, condition).map_err(|e| e.at_boundary(name))?;
+            if let Some(key) = condition.heat() {
+                return Err(Error::scene(
+                    format!("{path}.{key}"),
+                    "a condition for heat needs the section `heat`, which switches heat on",
+                )
+                .at_boundary(name));
+            }
         }
         Ok(())
     }

@@ -1,5 +1,3 @@
-//! Scene to points: positions, tributary volumes, and boundary patches with areas and normals.
-//!
 //! A union of boxes becomes one rectilinear lattice: the bounds of all boxes cut each axis into
 //! segments, each divided evenly by the finest spacing that a box asks for there. Nodes of filled
 //! cells are particles; a particle's tributary volume and areas are an eighth of its cells and a
@@ -7,48 +5,9 @@
 
 use std::collections::BTreeMap;
 
+use super::{Face, NONE, Particles, Shape, Share, patches, surface};
 use crate::error::{Code, Error, Result};
-use crate::scene::{BoxGeometry, Geometry, PatchSelection, Scene, Spacing};
-
-/// The points of a body, in the body's order: lexicographic, shortest lattice axis first, which
-/// keeps neighbours close in memory.
-#[derive(Debug, Clone)]
-pub struct Particles {
-    /// X [m], initial.
-    pub positions: Vec<[f64; 3]>,
-    /// V_R [m^3], initial.
-    pub volumes: Vec<f64>,
-    /// Sum of A_R N [m^2], initial; zero inside the body.
-    pub surface: Vec<[f64; 3]>,
-    /// Body's particle to caller's particle (lexicographic, X first, then Y, then Z).
-    pub order: Vec<u32>,
-    /// Caller's particle to body's particle.
-    pub rank: Vec<u32>,
-    /// The lattice behind the points.
-    pub lattice: Lattice,
-    /// Named patches: all faces of the geometry, then the scene's own.
-    pub patches: Vec<PatchFacets>,
-}
-
-/// A named part of the surface.
-#[derive(Debug, Clone)]
-pub struct PatchFacets {
-    /// Name.
-    pub name: String,
-    /// Outward normal and tributary area [m^2] by body's particle; several where normals differ.
-    pub facets: Vec<Facet>,
-}
-
-/// Share of one particle in a plane piece of the surface.
-#[derive(Debug, Clone, Copy)]
-pub struct Facet {
-    /// Body's particle.
-    pub particle: u32,
-    /// Unit outward normal N, initial.
-    pub normal: [f64; 3],
-    /// A_R [m^2], initial.
-    pub area: f64,
-}
+use crate::scene::{BoxGeometry, PatchSelection};
 
 /// A rectilinear lattice with filled cells.
 #[derive(Debug, Clone)]
@@ -63,7 +22,6 @@ pub struct Lattice {
     sites: Vec<[u32; 3]>,
 }
 
-const NONE: u32 = u32::MAX;
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
 impl Lattice {
@@ -189,7 +147,7 @@ fn lattice_lines(boxes: &[(String, &BoxGeometry)], axis: usize) -> Vec<f64> {
         let cells = boxes
             .iter()
             .filter(|(_, b)| b.min[axis] < middle && middle < b.max[axis])
-            .map(|(_, b)| ((to - from) / spacing(b)[axis]).round().max(1.0) as usize)
+            .map(|(_, b)| ((to - from) / b.spacing.per_axis()[axis]).round().max(1.0) as usize)
             .max()
             .unwrap_or(1);
         for i in 1..=cells {
@@ -240,40 +198,14 @@ fn check_spacings(lattice: &Lattice) -> Result<()> {
     Ok(())
 }
 
-fn spacing(b: &BoxGeometry) -> [f64; 3] {
-    match b.spacing {
-        Spacing::Uniform(s) => [s; 3],
-        Spacing::PerAxis(s) => s,
-    }
-}
-
-/// The boxes of a geometry with the prefix of their face names.
-fn named_boxes(geometry: &Geometry) -> Vec<(String, &BoxGeometry)> {
-    match geometry {
-        Geometry::Box(b) => vec![(String::new(), b)],
-        Geometry::Boxes(boxes) => boxes.iter().map(|(n, b)| (format!("{n}."), b)).collect(),
-    }
-}
-
-/// A face of a filled cell that no other filled cell shares.
-struct BoundaryFace {
-    /// Names it has: one for every box on whose bound it lies.
-    names: Vec<String>,
-    axis: usize,
-    sign: f64,
-    area: f64,
-    centre: [f64; 3],
-    corners: [u32; 4],
-}
-
 impl Particles {
-    /// The points of a scene.
-    ///
-    /// # Errors
-    /// [`Code::InvalidScene`] naming the patch that selects no particle, [`Code::OutOfMemory`].
-    pub fn new(scene: &Scene) -> Result<Self> {
-        let boxes = named_boxes(&scene.geometry);
-        let lines: [Vec<f64>; 3] = std::array::from_fn(|a| lattice_lines(&boxes, a));
+    /// The points of a union of boxes, each with the prefix of its faces' names; in lexicographic
+    /// order, shortest axis first.
+    pub(super) fn of_lattice(
+        boxes: &[(String, &BoxGeometry)],
+        selections: &BTreeMap<String, PatchSelection>,
+    ) -> Result<Self> {
+        let lines: [Vec<f64>; 3] = std::array::from_fn(|a| lattice_lines(boxes, a));
         let nodes = lines.iter().map(|l| l.len() as f64).product::<f64>();
         if nodes >= f64::from(i32::MAX) {
             return Err(Error::new(
@@ -290,7 +222,7 @@ impl Particles {
         };
         let cells = [0, 1, 2].map(|a| lattice.cells(a));
         lattice.filled = vec![false; cells.iter().product()];
-        for (_, b) in &boxes {
+        for (_, b) in boxes {
             let range = |a: usize| {
                 let l = &lattice.lines[a];
                 let inside = |c: &usize| {
@@ -326,15 +258,10 @@ impl Particles {
             }
         }
         let count = callers as usize;
-        let mut this = Self {
-            positions: Vec::with_capacity(count),
-            volumes: Vec::with_capacity(count),
-            surface: vec![[0.0; 3]; count],
-            order: Vec::with_capacity(count),
-            rank: vec![0; count],
-            lattice,
-            patches: Vec::new(),
-        };
+        let mut positions = Vec::with_capacity(count);
+        let mut volumes = Vec::with_capacity(count);
+        let mut order = Vec::with_capacity(count);
+        let mut rank = vec![0; count];
         for k in 0..sizes[axes[2]] {
             for j in 0..sizes[axes[1]] {
                 for i in 0..sizes[axes[0]] {
@@ -342,39 +269,31 @@ impl Particles {
                     site[axes[0]] = i;
                     site[axes[1]] = j;
                     site[axes[2]] = k;
-                    let n = this.lattice.node_index(site);
+                    let n = lattice.node_index(site);
                     if caller_of_node[n] == NONE {
                         continue;
                     }
-                    let body = this.positions.len() as u32;
-                    this.lattice.node[n] = body;
-                    this.lattice.sites.push(site.map(|s| s as u32));
-                    this.positions
-                        .push(std::array::from_fn(|a| this.lattice.lines[a][site[a]]));
-                    this.volumes.push(volumes_by_node[n]);
-                    this.order.push(caller_of_node[n]);
-                    this.rank[caller_of_node[n] as usize] = body;
+                    let body = positions.len() as u32;
+                    lattice.node[n] = body;
+                    lattice.sites.push(site.map(|s| s as u32));
+                    positions.push(std::array::from_fn(|a| lattice.lines[a][site[a]]));
+                    volumes.push(volumes_by_node[n]);
+                    order.push(caller_of_node[n]);
+                    rank[caller_of_node[n] as usize] = body;
                 }
             }
         }
-        let faces = boundary_faces(&this.lattice, &boxes);
-        for face in &faces {
-            for corner in face.corners {
-                this.surface[corner as usize][face.axis] += 0.25 * face.sign * face.area;
-            }
-        }
-        this.patches = patches(&faces, &scene.patches)?;
-        Ok(this)
-    }
-
-    /// Number of particles.
-    pub fn count(&self) -> usize {
-        self.positions.len()
-    }
-
-    /// Caller's number of a body's particle.
-    pub fn caller(&self, body: usize) -> usize {
-        self.order[body] as usize
+        let names = face_names(boxes);
+        let faces = boundary_faces(&lattice, boxes);
+        Ok(Self {
+            positions,
+            volumes,
+            surface: surface(&faces, count),
+            order,
+            rank,
+            shape: Shape::Lattice(lattice),
+            patches: patches(&faces, &names, selections)?,
+        })
     }
 }
 
@@ -400,7 +319,19 @@ fn tributary_volumes(lattice: &Lattice) -> Vec<f64> {
     volumes
 }
 
-fn boundary_faces(lattice: &Lattice, boxes: &[(String, &BoxGeometry)]) -> Vec<BoundaryFace> {
+/// Names of the faces, six a box: lower and upper along each axis.
+fn face_names(boxes: &[(String, &BoxGeometry)]) -> Vec<String> {
+    boxes
+        .iter()
+        .flat_map(|(prefix, _)| {
+            AXES.into_iter()
+                .flat_map(move |axis| ["min", "max"].map(|side| format!("{prefix}{axis}_{side}")))
+        })
+        .collect()
+}
+
+/// Faces of filled cells that no other filled cell shares, named as in [`face_names`].
+fn boundary_faces(lattice: &Lattice, boxes: &[(String, &BoxGeometry)]) -> Vec<Face> {
     let mut faces = Vec::new();
     for k in 0..lattice.cells(2) {
         for j in 0..lattice.cells(1) {
@@ -414,7 +345,7 @@ fn boundary_faces(lattice: &Lattice, boxes: &[(String, &BoxGeometry)]) -> Vec<Bo
                 });
                 let inside =
                     |b: &BoxGeometry| (0..3).all(|a| b.min[a] < middle[a] && middle[a] < b.max[a]);
-                let owners: Vec<_> = boxes.iter().filter(|(_, b)| inside(b)).collect();
+                let owners = || (0..boxes.len()).filter(|b| inside(boxes[*b].1));
                 for axis in 0..3 {
                     for side in 0..2 {
                         let mut beyond = cell.map(|c| c as isize);
@@ -427,26 +358,25 @@ fn boundary_faces(lattice: &Lattice, boxes: &[(String, &BoxGeometry)]) -> Vec<Bo
                             |a: usize| lattice.lines[a][cell[a] + 1] - lattice.lines[a][cell[a]];
                         let mut centre = middle;
                         centre[axis] = lattice.lines[axis][cell[axis] + side];
-                        let corners = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[du, dv]| {
+                        let area = 0.25 * (width(u) * width(v));
+                        let mut vector = [0.0; 3];
+                        vector[axis] = if side == 0 { -area } else { area };
+                        let shares = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[du, dv]| {
                             let mut n = cell;
                             n[axis] += side;
                             n[u] += du;
                             n[v] += dv;
-                            lattice.node[lattice.node_index(n)]
+                            Share {
+                                particle: lattice.node[lattice.node_index(n)],
+                                vector,
+                                area,
+                            }
                         });
-                        faces.push(BoundaryFace {
+                        faces.push(Face {
                             // An exposed face of a filled cell is a bound of every box around it.
-                            names: owners
-                                .iter()
-                                .map(|(prefix, _)| {
-                                    format!("{prefix}{}_{}", AXES[axis], ["min", "max"][side])
-                                })
-                                .collect(),
-                            axis,
-                            sign: 2.0 * side as f64 - 1.0,
-                            area: width(u) * width(v),
+                            names: owners().map(|b| (6 * b + 2 * axis + side) as u32).collect(),
                             centre,
-                            corners,
+                            shares,
                         });
                     }
                 }
@@ -454,84 +384,4 @@ fn boundary_faces(lattice: &Lattice, boxes: &[(String, &BoxGeometry)]) -> Vec<Bo
         }
     }
     faces
-}
-
-/// Facets of a set of faces: per particle and direction, the normal and the summed quarter areas.
-fn facets<'a>(faces: impl Iterator<Item = &'a BoundaryFace>) -> Vec<Facet> {
-    let mut areas: BTreeMap<(u32, usize, bool), f64> = BTreeMap::new();
-    for face in faces {
-        for corner in face.corners {
-            *areas
-                .entry((corner, face.axis, face.sign > 0.0))
-                .or_default() += 0.25 * face.area;
-        }
-    }
-    areas
-        .into_iter()
-        .map(|((particle, axis, positive), area)| {
-            let mut normal = [0.0; 3];
-            normal[axis] = if positive { 1.0 } else { -1.0 };
-            Facet {
-                particle,
-                normal,
-                area,
-            }
-        })
-        .collect()
-}
-
-fn patches(
-    faces: &[BoundaryFace],
-    selections: &BTreeMap<String, PatchSelection>,
-) -> Result<Vec<PatchFacets>> {
-    let mut names: Vec<&str> = faces
-        .iter()
-        .flat_map(|f| f.names.iter().map(String::as_str))
-        .collect();
-    names.sort_unstable();
-    names.dedup();
-    let mut patches: Vec<PatchFacets> = names
-        .iter()
-        .map(|name| PatchFacets {
-            name: (*name).to_string(),
-            facets: facets(faces.iter().filter(|f| f.names.iter().any(|n| n == name))),
-        })
-        .collect();
-    for (name, selection) in selections {
-        if let Some(unknown) = selection
-            .faces
-            .iter()
-            .find(|f| !names.contains(&f.as_str()))
-        {
-            return Err(Error::scene(
-                format!("patches.{name}.faces"),
-                format!(
-                    "the body has no exposed face `{unknown}`; it has {}",
-                    names.join(", ")
-                ),
-            ));
-        }
-        let inside = |c: &[f64; 3]| {
-            (0..3).all(|a| {
-                selection.min.is_none_or(|min| c[a] >= min[a])
-                    && selection.max.is_none_or(|max| c[a] <= max[a])
-            })
-        };
-        let facets =
-            facets(faces.iter().filter(|f| {
-                f.names.iter().any(|n| selection.faces.contains(n)) && inside(&f.centre)
-            }));
-        if facets.is_empty() {
-            return Err(Error::scene(
-                format!("patches.{name}"),
-                "selects no particle: the centres of the lattice cell faces must lie in [min, max]",
-            )
-            .at_boundary(name));
-        }
-        patches.push(PatchFacets {
-            name: name.clone(),
-            facets,
-        });
-    }
-    Ok(patches)
 }

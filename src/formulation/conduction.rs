@@ -1,0 +1,199 @@
+//! Fourier conduction in the form of [URL23] (67) whose entropy production is a sum of squares.
+//!
+//! With the conduction variable beta = 1/theta the flux q = k theta^2 grad beta, and the heat
+//! Q_a = -sum_b (w_a . g_ab - w_b . g_ba), w = S^T q, produces the entropy
+//! sum_a beta_a Q_a = sum_a v k theta^2 |grad beta|^2 >= 0 exactly ([URL23] 74, whose last equality
+//! holds for this q and not for q = -k grad theta).
+//!
+//! A gradient of a gradient does not see a temperature that alternates from particle to particle.
+//! So the pairs exchange heat by what the gradients of both sides leave of their jump,
+//!
+//! s_ab = K_ab [beta_b - beta_a - 1/2 (grad beta_a + grad beta_b) . x_ab],
+//! K_ab = e k theta_a theta_b |c_ab|/|x_ab|,
+//!
+//! and its transpose goes into the fluxes, q_a <- q_a - sum_b s_ab x_ab/(2 v_a), so that the whole
+//! produces sum_a v k theta^2 |grad beta|^2 + sum_ab s_ab^2/(2 K_ab). It vanishes for a linear beta.
+
+use super::passes::{ForceInput, HalfSlope, Kinematics, lanes_of};
+use super::url::Runner;
+use crate::lane::{Lane, PerSlot, Work};
+use crate::layout::{Array, Layout};
+use crate::material::Thermal;
+use crate::math::*;
+use crate::parallel;
+use crate::reference::{PairVectors, load3, load9, store3, with_pairs};
+
+/// e above: an alternating temperature then decays as fast as the gradients' highest mode, so that
+/// the term costs nothing of the stable step.
+const JUMP_SHARE: f64 = 0.25;
+
+/// Stable step over |x|^2 c_v/k: the third-order Runge-Kutta scheme reaches -2.51 on the real axis.
+const STABLE_SHARE: f64 = 0.5;
+
+/// Conduction of one body.
+#[derive(Debug)]
+pub(super) struct Conduction {
+    thermal: Thermal,
+    /// Half the spatial gradient of beta [1/(K m)].
+    half_slope: Array<3>,
+    /// w_a.
+    flux: Array<3>,
+}
+
+impl Conduction {
+    pub fn new(layout: Layout, thermal: Thermal) -> Self {
+        Self {
+            thermal,
+            half_slope: Array::new(layout, [0.0; 3]),
+            flux: Array::new(layout, [0.0; 3]),
+        }
+    }
+
+    /// Heat into each particle [W]; the entropy produced [W/K] and the stable step [s].
+    pub fn rates<R: Runner>(
+        &mut self,
+        input: &ForceInput,
+        kinematics: &Kinematics,
+        theta: &Array<2>,
+        heat: &mut Array<1>,
+    ) -> (f64, f64) {
+        let (reference, kinematics, thermal) = (input.reference, *kinematics, self.thermal);
+        let [theta, beta] = theta.components();
+        parallel::map_slabs(self.half_slope.slabs_mut(), |slab, out| {
+            with_pairs!(reference, pairs => R::run(HalfSlope {
+                pairs, reference, kinematics, field: beta, slab, out,
+            }));
+        });
+        let half_slope = self.half_slope.components();
+        let slabs: Vec<_> = std::iter::zip(self.flux.slabs_mut(), heat.slabs_mut()).collect();
+        let found = parallel::map_slabs(slabs, |slab, (flux, [heat])| {
+            with_pairs!(reference, pairs => R::run(Jumps {
+                pairs, input: *input, kinematics, thermal, theta, beta, half_slope, slab, flux, heat,
+            }))
+        });
+        let flux = self.flux.components();
+        parallel::map_slabs(heat.slabs_mut(), |slab, [heat]| {
+            with_pairs!(reference, pairs => R::run(Divergence {
+                pairs, input: *input, flux, slab, heat,
+            }));
+        });
+        let (entropy, length2) = found
+            .into_iter()
+            .fold((0.0, f64::INFINITY), |(s, l), (production, length2)| {
+                (s + production, l.min(length2))
+            });
+        let step = STABLE_SHARE * length2 * thermal.c_v / thermal.conductivity;
+        (entropy, step)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.half_slope.bytes() + self.flux.bytes()
+    }
+}
+
+/// s_ab and the fluxes; (entropy produced, smallest |x_ab|^2 V_R/v) of the slab.
+struct Jumps<'a, P> {
+    pairs: P,
+    input: ForceInput<'a>,
+    kinematics: Kinematics<'a>,
+    thermal: Thermal,
+    theta: &'a [f64],
+    beta: &'a [f64],
+    half_slope: [&'a [f64]; 3],
+    slab: usize,
+    flux: [&'a mut [f64]; 3],
+    heat: &'a mut [f64],
+}
+
+impl<P: PairVectors> Work for Jumps<'_, P> {
+    type Output = (f64, f64);
+    #[inline(always)]
+    fn run<T: Lane>(mut self, token: T::Token) -> (f64, f64) {
+        let Self {
+            pairs,
+            input,
+            thermal,
+            ..
+        } = self;
+        let slices = &input.reference.slices;
+        let weights = slices.weights();
+        let volume = input.reference.volume.components()[0];
+        let far = T::splat(token, f64::INFINITY);
+        let tiny = T::splat(token, f64::MIN_POSITIVE);
+        let half = T::splat(token, 0.5);
+        let conductivity = T::splat(token, thermal.conductivity);
+        let share = T::splat(token, JUMP_SHARE * thermal.conductivity);
+        let (mut produced, mut shortest) = (PerSlot::new(0.0), PerSlot::new(f64::INFINITY));
+        for (at, a) in lanes_of::<T>(input.reference, self.slab) {
+            let centre = pairs.centre::<T>(token, a);
+            let sa = input.area::<T>(token, a);
+            let (xa, beta_a) = (input.position::<T>(token, a), T::load(token, self.beta, a));
+            let theta_a = thermal.divisor(T::load(token, self.theta, a));
+            let slope_a = load3::<T>(token, &self.half_slope, a);
+            let (mut sum, mut moment) = (T::splat(token, 0.0), zero3(token));
+            let mut entropy = T::splat(token, 0.0);
+            let mut length2 = far;
+            for (b, pair) in slices.of(a) {
+                let (g, back) = pairs.pair(token, &centre, b, pair);
+                let dx = sub3(input.position(token, b), xa);
+                let dx2 = dot(dx, dx);
+                let mask = T::load(token, weights, pair);
+                length2 = length2.min(mask.if_positive(dx2, far));
+                let c = sub3(mat_vec(&sa, g), mat_vec(&input.area(token, b), back));
+                let theta_b = thermal.divisor(T::load(token, self.theta, b));
+                let k = share * theta_a * theta_b * (dot(c, c) / (dx2 + tiny)).sqrt();
+                let slopes = add3(slope_a, load3(token, &self.half_slope, b));
+                let jump = T::load(token, self.beta, b) - beta_a - dot(slopes, dx);
+                let s = k * jump;
+                sum = sum + s;
+                moment = axpy3(moment, s, dx);
+                entropy = s.mul_add(jump, entropy);
+            }
+            (-sum).store(self.heat, at);
+            // v = V_chi det f.
+            let f = load9::<T>(token, &self.kinematics.f, a);
+            let v_r = T::load(token, volume, a);
+            let mut v = v_r * dot(f[0], cofactor(&f)[0]);
+            if let Some(j_chi) = self.kinematics.j_chi {
+                v = v * T::load(token, j_chi, a);
+            }
+            let slope = add3(slope_a, slope_a);
+            let conductance = conductivity * theta_a * theta_a;
+            let q = axpy3(scale3(conductance, slope), -half / (v + tiny), moment);
+            store3(&vec_mat(q, &sa), &mut self.flux, at);
+            produced.add(
+                at,
+                (v * conductance).mul_add(dot(slope, slope), half * entropy),
+            );
+            shortest.min(at, length2 * v_r / (v + tiny));
+        }
+        (produced.sum(), shortest.least())
+    }
+}
+
+/// Heat by the divergence of the fluxes.
+struct Divergence<'a, P> {
+    pairs: P,
+    input: ForceInput<'a>,
+    flux: [&'a [f64]; 3],
+    slab: usize,
+    heat: &'a mut [f64],
+}
+
+impl<P: PairVectors> Work for Divergence<'_, P> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(self, token: T::Token) {
+        for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
+            let centre = self.pairs.centre::<T>(token, a);
+            let flux_a = load3::<T>(token, &self.flux, a);
+            let mut heat = T::load(token, self.heat, at);
+            for (b, pair) in self.input.reference.slices.of(a) {
+                let (g, back) = self.pairs.pair(token, &centre, b, pair);
+                heat = heat - (dot(flux_a, g) - dot(load3(token, &self.flux, b), back));
+            }
+            heat.store(self.heat, at);
+        }
+    }
+}
