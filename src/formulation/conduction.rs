@@ -27,7 +27,9 @@ use crate::reference::{PairVectors, load3, load9, store3, with_pairs};
 /// the term costs nothing of the stable step.
 const JUMP_SHARE: f64 = 0.25;
 
-/// Stable step over |x|^2 c_v/k: the third-order Runge-Kutta scheme reaches -2.51 on the real axis.
+/// Stable step over l^2 c_v/k, l the shortest edge or 5/kappa_a, kappa_a = sum |c_ab|/v_a, whatever is
+/// less. A free block of 9^3 particles with random temperatures decays up to 0.38, 0.75 and 0.95 times
+/// |x|^2 c_v/k with 6, 18 and 26 neighbours, where kappa |x| is 6, 4.8 and 4.6.
 const STABLE_SHARE: f64 = 0.5;
 
 /// Conduction of one body.
@@ -133,7 +135,7 @@ impl<P: PairVectors> Work for Jumps<'_, P> {
             let slope_a = load3::<T>(token, &self.half_slope, a);
             let (mut sum, mut moment) = (T::splat(token, 0.0), zero3(token));
             let mut entropy = T::splat(token, 0.0);
-            let mut length2 = far;
+            let (mut length2, mut areas) = (far, tiny);
             for (b, pair) in slices.of(a) {
                 let (g, back) = pairs.pair(token, &centre, b, pair);
                 let dx = sub3(input.position(token, b), xa);
@@ -142,7 +144,9 @@ impl<P: PairVectors> Work for Jumps<'_, P> {
                 length2 = length2.min(mask.if_positive(dx2, far));
                 let c = sub3(mat_vec(&sa, g), mat_vec(&input.area(token, b), back));
                 let theta_b = thermal.divisor(T::load(token, self.theta, b));
-                let k = share * theta_a * theta_b * (dot(c, c) / (dx2 + tiny)).sqrt();
+                let norm = dot(c, c).sqrt();
+                areas = areas + norm;
+                let k = share * theta_a * theta_b * norm / (dx2 + tiny).sqrt();
                 let slopes = add3(slope_a, load3(token, &self.half_slope, b));
                 let jump = T::load(token, self.beta, b) - beta_a - dot(slopes, dx);
                 let s = k * jump;
@@ -166,7 +170,9 @@ impl<P: PairVectors> Work for Jumps<'_, P> {
                 at,
                 (v * conductance).mul_add(dot(slope, slope), half * entropy),
             );
-            shortest.min(at, length2 * v_r / (v + tiny));
+            let reach = T::splat(token, 5.0) * v / areas;
+            let limit = length2.min(reach * reach) * v_r / v;
+            shortest.min(at, v.if_positive(limit, far));
         }
         (produced.sum(), shortest.least())
     }
