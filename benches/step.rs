@@ -9,6 +9,21 @@ use urlsph::{Scene, Simulation};
 
 const SCENE: &str = include_str!("../examples/column_twisting/scene.json");
 
+/// Plasticity as soft as the column is: it flows from the first steps on.
+const VON_MISES: &str = r#"material={"von_mises": {
+    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
+    "yield_stress": 1e4, "hardening_modulus": 1e5
+}}"#;
+const JOHNSON_COOK: &str = r#"material={"johnson_cook": {
+    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
+    "yield_stress": 1e4, "hardening_modulus": 1e5, "hardening_exponent": 0.31,
+    "rate_coefficient": 0.025, "reference_strain_rate": 1,
+    "softening_exponent": 1.09, "melting_temperature": 1356, "transition_temperature": 290
+}}"#;
+const HEAT: &str = r#"heat={
+    "specific_heat": 383, "reference_temperature": 293, "conductivity": 10, "gruneisen_coefficient": 0.1
+}"#;
+
 /// The twisted column after a few steps, at a spacing.
 fn column(spacing: f64, threads: usize, overrides: &[&str]) -> Simulation {
     let mut all = vec![format!("geometry.box.spacing={spacing}")];
@@ -82,6 +97,9 @@ fn options(c: &mut Criterion) {
         ),
         ("26 neighbours", &["numerics.neighbours=26"]),
         ("6 neighbours", &["numerics.neighbours=6"]),
+        ("heat", &[HEAT]),
+        ("von Mises plasticity", &[VON_MISES]),
+        ("Johnson-Cook plasticity and heat", &[JOHNSON_COOK, HEAT]),
     ];
     let mut group = c.benchmark_group("step, 3,969 particles, 1 thread");
     for (name, overrides) in cases {

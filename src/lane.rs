@@ -144,18 +144,18 @@ const TWO_54: f64 = (1_u64 << 54) as f64;
 const INTEGER_BITS: f64 = 6_755_399_441_055_744.0;
 /// 2^52 + 1023: see [`exponent_around_one`].
 const EXPONENT_OFFSET: f64 = 4_503_599_627_371_519.0;
-/// ln(2) in two parts; the first has 20 trailing zero bits, so its product with an exponent is exact.
-const LN_2_HIGH: f64 = 6.931_471_803_691_238_164_90e-1;
-const LN_2_LOW: f64 = 1.908_214_929_270_587_700_02e-10;
+/// ln(2) in two parts; the first has 21 trailing zero bits, so its product with an exponent is exact.
+const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
+const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 /// Coefficients of R(s^2)/s^2 in fdlibm's e_log.c.
 const LN: [f64; 7] = [
-    6.666_666_666_666_735_130e-1,
-    3.999_999_999_940_941_908e-1,
-    2.857_142_874_366_239_149e-1,
-    2.222_219_843_214_978_396e-1,
-    1.818_357_216_161_805_012e-1,
-    1.531_383_769_920_937_332e-1,
-    1.479_819_860_511_658_591e-1,
+    6.666_666_666_666_735e-1,
+    3.999_999_999_940_942e-1,
+    2.857_142_874_366_239e-1,
+    2.222_219_843_214_978_4e-1,
+    1.818_357_216_161_805e-1,
+    1.531_383_769_920_937_3e-1,
+    1.479_819_860_511_658_6e-1,
 ];
 /// 1/k!.
 pub const INVERSE_FACTORIALS: [f64; 14] = {

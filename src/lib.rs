@@ -11,6 +11,8 @@
 //! | neighbours | | `neighbours` |
 //! | kernel, corrected gradients, pseudo-areas, the four options | 37-52, 58 | `kernel`, `reference` |
 //! | neo-Hookean and Mooney-Rivlin laws | 5-8 | `material` |
+//! | Hencky's elasticity and the radial return of plastic flow | remark 3; [URL23] 31-40 | `material::hencky` |
+//! | von Mises and Johnson-Cook yield stresses | tables 3, 4; [URL23] 41, 42 | `material::von_mises`, `material::johnson_cook` |
 //! | rates of v, f, h, j | 53-57 | `formulation::url` |
 //! | Riemann dissipation and reconstruction | 59, 60 | `formulation::riemann`, `formulation::limiter` |
 //! | Runge-Kutta, time step | 61-63 | `integrator`, `simulation` |

@@ -2,12 +2,14 @@
 //!
 //! Imports nothing of ours but the lane. Set-up code that needs decompositions uses nalgebra.
 
-use crate::lane::Lane;
+use crate::lane::{INVERSE_FACTORIALS, Lane};
 
 /// A vector.
 pub type Vec3<T> = [T; 3];
 /// A second-order tensor, row-major.
 pub type Mat3<T> = [[T; 3]; 3];
+/// A symmetric second-order tensor: xx, yy, zz, xy, xz, yz.
+pub type Sym3<T> = [T; 6];
 
 /// Identity of set-up code.
 pub const IDENTITY: Mat3<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -200,6 +202,190 @@ pub fn largest_eigenvalue<T: Lane>(a: &Mat3<T>) -> T {
     (p + p).mul_add(c.min(one).max(half), m)
 }
 
+/// All components.
+#[inline(always)]
+pub fn full<T: Copy>(s: &Sym3<T>) -> Mat3<T> {
+    [[s[0], s[3], s[4]], [s[3], s[1], s[5]], [s[4], s[5], s[2]]]
+}
+
+/// S + s I.
+#[inline(always)]
+fn add_identity<T: Lane>(a: &Sym3<T>, s: T) -> Sym3<T> {
+    [a[0] + s, a[1] + s, a[2] + s, a[3], a[4], a[5]]
+}
+
+/// S - tr(S)/3 I.
+#[inline(always)]
+pub fn deviator<T: Lane>(a: &Sym3<T>) -> Sym3<T> {
+    let mean = (a[0] + a[1] + a[2]) * a[0].of(1.0 / 3.0);
+    add_identity(a, -mean)
+}
+
+/// S : S.
+#[inline(always)]
+pub fn square<T: Lane>(a: &Sym3<T>) -> T {
+    let off = dot([a[3], a[4], a[5]], [a[3], a[4], a[5]]);
+    off + dot([a[0], a[1], a[2]], [a[0], a[1], a[2]]) + off
+}
+
+/// A S A^T.
+#[inline(always)]
+pub fn congruence<T: Lane>(a: &Mat3<T>, s: &Sym3<T>) -> Sym3<T> {
+    let m = mat_mul(a, &full(s));
+    [
+        dot(m[0], a[0]),
+        dot(m[1], a[1]),
+        dot(m[2], a[2]),
+        dot(m[0], a[1]),
+        dot(m[0], a[2]),
+        dot(m[1], a[2]),
+    ]
+}
+
+/// A B where both are functions of one tensor, so that the product is symmetric too.
+#[inline(always)]
+fn commuting_product<T: Lane>(a: &Sym3<T>, b: &Sym3<T>) -> Sym3<T> {
+    let (a, b) = (full(a), full(b));
+    [
+        dot(a[0], b[0]),
+        dot(a[1], b[1]),
+        dot(a[2], b[2]),
+        dot(a[0], b[1]),
+        dot(a[0], b[2]),
+        dot(a[1], b[2]),
+    ]
+}
+
+/// Polynomial of a tensor whose square is known: Horner's scheme on the coefficients of A^2, A and I,
+/// to which Cayley and Hamilton's theorem, A^3 = I1 A^2 - I2 A + I3 I, reduces every power.
+#[inline(always)]
+fn polynomial<T: Lane>(
+    a: &Sym3<T>,
+    a2: &Sym3<T>,
+    coefficients: impl Iterator<Item = f64>,
+) -> Sym3<T> {
+    let zero = a[0].of(0.0);
+    let minors = cofactor(&full(a));
+    let i1 = a[0] + a[1] + a[2];
+    let i2 = minors[0][0] + minors[1][1] + minors[2][2];
+    let i3 = dot([a[0], a[3], a[4]], minors[0]);
+    let (mut p2, mut p1, mut p0) = (zero, zero, zero);
+    for c in coefficients {
+        (p2, p1, p0) = (
+            p2.mul_add(i1, p1),
+            (-p2).mul_add(i2, p0),
+            p2.mul_add(i3, zero.of(c)),
+        );
+    }
+    let mut sum = [zero; 6];
+    for k in 0..6 {
+        sum[k] = p2.mul_add(a2[k], p1 * a[k]);
+    }
+    add_identity(&sum, p0)
+}
+
+/// The logarithm of a symmetric positive definite tensor. Near the identity, where the elastic
+/// strains of metals are, it is 2 artanh(Z), Z = (B - I)(B + I)^-1; the eigenvalues serve elsewhere.
+#[inline(always)]
+pub fn ln_symmetric<T: Lane>(b: &Sym3<T>) -> Sym3<T> {
+    // artanh(Z)/Z to Z^14: the remainder is below 4e-17 for |B - I| <= 0.2.
+    const TERMS: u32 = 8;
+    let one = b[0].of(1.0);
+    let difference = add_identity(b, -one);
+    let outside = square(&difference) - one.of(0.04);
+    let sum = add_identity(b, one);
+    let adjugate = cofactor(&full(&sum));
+    let factor = one.of(2.0) / dot([sum[0], sum[3], sum[4]], adjugate[0]);
+    let inverse = [
+        adjugate[0][0],
+        adjugate[1][1],
+        adjugate[2][2],
+        adjugate[0][1],
+        adjugate[0][2],
+        adjugate[1][2],
+    ];
+    let z2 = commuting_product(&difference, &inverse).map(|z| z * factor); // 2 Z
+    let y = commuting_product(&z2, &z2).map(|y| y * one.of(0.25)); // Z^2
+    let series = polynomial(
+        &y,
+        &commuting_product(&y, &y),
+        (0..TERMS).rev().map(|k| 1.0 / f64::from(2 * k + 1)),
+    );
+    let near = commuting_product(&z2, &series);
+    if !outside.any_positive() {
+        return near;
+    }
+    let (values, vectors) = eigen(b);
+    let far = spectral(values.map(T::ln), &vectors);
+    select(outside, &far, &near)
+}
+
+/// The exponential of a symmetric tensor: its series where it is small, by its eigenvalues elsewhere.
+#[inline(always)]
+pub fn exp_symmetric<T: Lane>(a: &Sym3<T>) -> Sym3<T> {
+    // To A^12: the remainder is below 3e-17 for |A| <= 0.3.
+    let outside = square(a) - a[0].of(0.09);
+    let near = polynomial(
+        a,
+        &commuting_product(a, a),
+        INVERSE_FACTORIALS[..13].iter().rev().copied(),
+    );
+    if !outside.any_positive() {
+        return near;
+    }
+    let (values, vectors) = eigen(a);
+    let far = spectral(values.map(T::exp), &vectors);
+    select(outside, &far, &near)
+}
+
+/// `yes` where `choice > 0`, else `no`.
+#[inline(always)]
+pub fn select<T: Lane, const N: usize>(choice: T, yes: &[T; N], no: &[T; N]) -> [T; N] {
+    std::array::from_fn(|k| choice.if_positive(yes[k], no[k]))
+}
+
+/// Sum of values[k] v_k (x) v_k over the rows v_k.
+#[inline(always)]
+fn spectral<T: Lane>(values: Vec3<T>, vectors: &Mat3<T>) -> Sym3<T> {
+    let zero = values[0].of(0.0);
+    let diagonal = [values[0], values[1], values[2], zero, zero, zero];
+    congruence(&transpose(vectors), &diagonal)
+}
+
+/// Eigenvalues of a symmetric tensor, and its unit eigenvectors as rows, in no particular order: cyclic
+/// Jacobi rotations, whose number does not depend on the values. For components whose squares neither
+/// overflow nor underflow.
+#[inline(always)]
+pub fn eigen<T: Lane>(a: &Sym3<T>) -> (Vec3<T>, Mat3<T>) {
+    // Convergence is quadratic from about the third sweep on.
+    const SWEEPS: usize = 6;
+    let one = a[0].of(1.0);
+    let (mut m, mut v) = (full(a), identity(a[0].token()));
+    for _ in 0..SWEEPS {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let r = 3 - p - q;
+            // The smaller root of t^2 + 2 t cot(2 phi) - 1; t = 0 where there is nothing to rotate.
+            let (gap, twice) = (m[q][q] - m[p][p], m[p][q] + m[p][q]);
+            let size = gap.max(-gap) + gap.mul_add(gap, twice * twice).sqrt();
+            let t = (-gap).if_positive(-twice, twice) / (size + one.of(f64::MIN_POSITIVE));
+            let c = one / t.mul_add(t, one).sqrt();
+            let s = t * c;
+            let off = m[p][q];
+            m[p][p] = (-t).mul_add(off, m[p][p]);
+            m[q][q] = t.mul_add(off, m[q][q]);
+            m[p][q] = one.of(0.0);
+            let (rp, rq) = (m[r.min(p)][r.max(p)], m[r.min(q)][r.max(q)]);
+            m[r.min(p)][r.max(p)] = c * rp - s * rq;
+            m[r.min(q)][r.max(q)] = s * rp + c * rq;
+            (v[p], v[q]) = (
+                axpy3(scale3(c, v[p]), -s, v[q]),
+                axpy3(scale3(c, v[q]), s, v[p]),
+            );
+        }
+    }
+    ([m[0][0], m[1][1], m[2][2]], v)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,5 +444,115 @@ mod tests {
         check(IDENTITY);
         println!("relative error {worst:e} (tolerance 1e-7)");
         assert!(worst < 1e-7);
+    }
+
+    fn symmetric(values: [f64; 3], turn: usize) -> Sym3<f64> {
+        let q = Matrix3::from_fn(|r, c| sample(turn)[r][c]).qr().q();
+        let a = q * Matrix3::from_diagonal(&values.into()) * q.transpose();
+        [
+            a[(0, 0)],
+            a[(1, 1)],
+            a[(2, 2)],
+            a[(0, 1)],
+            a[(0, 2)],
+            a[(1, 2)],
+        ]
+    }
+
+    /// Distinct, equal and nearly equal values, condition numbers up to 1e8, next to the identity.
+    fn symmetric_samples() -> Vec<Sym3<f64>> {
+        let mut samples = vec![
+            [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+            [1.0, 1.0, 1.0, 1e-9, 0.0, 0.0],
+        ];
+        for i in 0..200 {
+            let t = (i as f64 * 0.618_033_988_75).fract();
+            for values in [
+                [1.0 + t, 0.3 + t, 0.1],
+                [2.0, 2.0, 0.5 + t],
+                [1.0, 1.0 + 1e-9 * t, 1.0 - 1e-9],
+                [1.0, 1.0 + 1e-15, 1.0 + 1e-14 * t],
+                [1e4, t + 0.5, 1e-4],
+                [1e4, 1e4 * (1.0 + 1e-12), 1e-4],
+                [1.0 + 0.11 * t, 1.0 - 0.11 * t, 1.0],
+                [1.0 + 0.19 * t, 1.0, 1.0],
+                [1.0 + 1e-3 * t, 1.0 - 2e-3 * t, 1.0 + 1e-3],
+            ] {
+                samples.push(symmetric(values, i));
+            }
+        }
+        samples
+    }
+
+    fn distance(a: &Sym3<f64>, b: &Sym3<f64>) -> f64 {
+        square(&std::array::from_fn::<_, 6, _>(|k| a[k] - b[k])).sqrt()
+    }
+
+    #[test]
+    fn eigenvalues_and_vectors_rebuild_the_tensor() {
+        let (mut worst, mut against): ([f64; 2], f64) = ([0.0; 2], 0.0);
+        for a in symmetric_samples() {
+            let (values, v) = eigen(&a);
+            let size = square(&a).sqrt();
+            worst[0] = worst[0].max(distance(&spectral(values, &v), &a) / size);
+            let unit = mat_mul_t(&v, &v);
+            let off = axpy9(&unit, -1.0, &IDENTITY);
+            worst[1] = worst[1].max(double_dot(&off, &off).sqrt());
+            let m = full(&a);
+            let mut exact: Vec<f64> = Matrix3::from_fn(|r, c| m[r][c])
+                .symmetric_eigenvalues()
+                .iter()
+                .copied()
+                .collect();
+            let mut ours = values;
+            exact.sort_by(f64::total_cmp);
+            ours.sort_by(f64::total_cmp);
+            for k in 0..3 {
+                against = against.max((ours[k] - exact[k]).abs() / size);
+            }
+        }
+        println!(
+            "rebuilt {:e}, orthogonal {:e}, eigenvalues {against:e} (tolerance 4e-15)",
+            worst[0], worst[1]
+        );
+        assert!(worst[0] < 4e-15 && worst[1] < 4e-15 && against < 4e-15);
+    }
+
+    #[test]
+    fn logarithm_and_exponential_are_each_others_inverse_and_match_nalgebra() {
+        let (mut round_trip, mut against): (f64, f64) = (0.0, 0.0);
+        for a in symmetric_samples() {
+            let log = ln_symmetric(&a);
+            round_trip = round_trip.max(distance(&exp_symmetric(&log), &a) / square(&a).sqrt());
+            let m = full(&a);
+            let e = Matrix3::from_fn(|r, c| m[r][c]).symmetric_eigen();
+            // The smallest eigenvalue is known to the round-off of the largest.
+            let condition = e.eigenvalues.max() / e.eigenvalues.min();
+            let exact = e.eigenvectors
+                * Matrix3::from_diagonal(&e.eigenvalues.map(f64::ln))
+                * e.eigenvectors.transpose();
+            let exact = [0, 1, 2, 3, 4, 5].map(|k| {
+                let (r, c) = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)][k];
+                exact[(r, c)]
+            });
+            against = against.max(distance(&log, &exact) / condition);
+        }
+        println!("round trip {round_trip:e} (tolerance 2e-14), ln {against:e} (tolerance 4e-15)");
+        assert!(round_trip < 2e-14 && against < 4e-15);
+    }
+
+    #[test]
+    fn logarithm_does_not_jump_where_its_series_ends() {
+        let mut worst: f64 = 0.0;
+        for i in 0..400 {
+            let direction = sample(i);
+            let s = [0, 1, 2].map(|k| direction[0][k]);
+            let size = 0.2 / dot(s, s).sqrt();
+            let inside = symmetric(s.map(|s| 1.0 + s * size * (1.0 - 1e-12)), i);
+            let outside = symmetric(s.map(|s| 1.0 + s * size * (1.0 + 1e-12)), i);
+            worst = worst.max(distance(&ln_symmetric(&inside), &ln_symmetric(&outside)));
+        }
+        println!("jump {worst:e} (tolerance 2e-12, of which 4e-13 is the distance)");
+        assert!(worst < 2e-12);
     }
 }

@@ -31,6 +31,13 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
     let mut on = vec![match &scene.material {
         crate::scene::Material::NeoHookean(_) => "neo-Hookean elasticity".to_string(),
         crate::scene::Material::MooneyRivlin(_) => "Mooney-Rivlin elasticity".to_string(),
+        crate::scene::Material::LinearElastic(_) => "linear elasticity".to_string(),
+        crate::scene::Material::VonMises(_) => {
+            "Hencky elasticity, von Mises plasticity".to_string()
+        }
+        crate::scene::Material::JohnsonCook(_) => {
+            "Hencky elasticity, Johnson-Cook plasticity".to_string()
+        }
     }];
     on.push(match n.neighbours {
         Neighbours::Lattice(count) => format!("{count} lattice neighbours"),

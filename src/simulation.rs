@@ -57,6 +57,9 @@ pub struct Simulation {
 /// of each particle's size is far beyond what the particles resolve, and going on would not end.
 const SMALLEST_STEP: f64 = 1e-6;
 
+/// Largest decay rate times step of convection; the three stages are stable up to 2.51.
+const CONVECTION_STEPS: f64 = 2.0;
+
 /// Named points and the particles that they are interpolated from.
 #[derive(Debug)]
 struct Probes {
@@ -266,11 +269,21 @@ impl Simulation {
     }
 
     /// Largest stable step from the present state [s]: the scene's fixed step, or
-    /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63), and no more than explicit conduction bears.
+    /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63), and no more than explicit conduction and
+    /// convection bear.
     pub fn stable_step(&self) -> f64 {
+        if let Some(step) = self.scene.numerics.time_step {
+            return step;
+        }
         let linear = self.cfl_number() * self.evaluation.length / self.url.wave_speeds().pressure;
-        let stable = linear.min(self.evaluation.conduction_step);
-        self.scene.numerics.time_step.unwrap_or(stable)
+        let Some(thermal) = self.url.thermal() else {
+            return linear;
+        };
+        let (boundary, reference) = (&self.boundary, &self.reference);
+        let convection = boundary.convection_rate(reference, self.time, &self.inputs);
+        let decay =
+            1.0 / self.evaluation.conduction_step + convection / (CONVECTION_STEPS * thermal.c_v);
+        linear.min(1.0 / decay)
     }
 
     /// The CFL number alpha of the scene, or the default for its neighbours.

@@ -10,12 +10,17 @@ use urlsph::scene::{
 };
 use urlsph::{Code, Error};
 
-const EXAMPLES: [&str; 5] = [
+const EXAMPLES: [&str; 10] = [
     "column_tension",
     "column_bending",
     "column_twisting",
     "l_block",
     "elastic_cube",
+    "swinging_cube",
+    "thermo_wave",
+    "slab_heating",
+    "homogeneous",
+    "l_block_thermal",
 ];
 
 fn example_path(name: &str) -> PathBuf {
@@ -369,10 +374,19 @@ fn everything() -> Value {
             "leg.z_min": {"traction": {"table": {"time": [0, 1], "value": [[0, 0, 0], [1, 2, 3]]}}},
             "leg.z_max": {"traction": {"external": [1, 2, 3], "per_particle": true}, "support": "antisymmetry"},
             "base.z_min": {"velocity": {"external": [0, 0, 0]}},
-            "base.z_max": {"support": "clamped", "pressure": {"table": {"time": [0], "value": [1]}}}
+            "base.z_max": {"support": "clamped", "pressure": {"table": {"time": [0], "value": [1]}}},
+            "base.x_min": {"heat_flux": {"external": 10, "per_particle": true}},
+            "leg.x_max": {"heat_flux": "X*t", "convection": {
+                "coefficient": {"external": 25}, "ambient_temperature": {"table": {"time": [0, 1], "value": [293, 300]}}
+            }},
+            "leg.y_max": {"temperature": "293 + 5*t"}
+        },
+        "heat": {
+            "specific_heat": 400, "reference_temperature": 293, "conductivity": 50, "gruneisen_coefficient": 2,
+            "gruneisen_exponent": 0.5, "plastic_heat_fraction": 0.9, "source": "1e3*sin(t)"
         },
         "body_force": [0, "-9.81*1100", 0],
-        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0]},
+        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "temperature": "300 - X"},
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
@@ -384,6 +398,25 @@ fn everything() -> Value {
     })
 }
 
+/// A material of a kind with every key.
+fn metal(kind: &str) -> Value {
+    let mut parameters = json!({"density": 8960, "youngs_modulus": 1.24e11, "poisson_ratio": 0.34});
+    let more = match kind {
+        "von_mises" => json!({
+            "yield_stress": 10, "hardening_modulus": 5, "saturation_stress": 20, "saturation_exponent": 3
+        }),
+        "johnson_cook" => json!({
+            "yield_stress": 9e7, "hardening_modulus": 2.92e8, "hardening_exponent": 0.31,
+            "rate_coefficient": 0.025, "reference_strain_rate": 1, "softening_exponent": 1.09,
+            "melting_temperature": 1356.2, "transition_temperature": 298.15
+        }),
+        _ => json!({}),
+    };
+    let all = parameters.as_object_mut().unwrap();
+    all.extend(more.as_object().unwrap().clone());
+    json!({ kind: parameters })
+}
+
 #[test]
 fn a_scene_survives_a_round_trip() {
     let full = Scene::from_json(&everything().to_string(), &[]).unwrap_or_else(|e| panic!("{e}"));
@@ -392,6 +425,13 @@ fn a_scene_survives_a_round_trip() {
         let text = serde_json::to_string(scene).unwrap();
         let again = Scene::from_json(&text, &[]).unwrap_or_else(|e| panic!("{}: {e}", scene.title));
         assert_eq!(*scene, again);
+    }
+    for kind in ["linear_elastic", "von_mises", "johnson_cook"] {
+        let mut scene = everything();
+        scene["material"] = metal(kind);
+        let scene = Scene::from_json(&scene.to_string(), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let text = serde_json::to_string(&scene).unwrap();
+        assert_eq!(scene, Scene::from_json(&text, &[]).unwrap());
     }
     let defaults = Scene::from_json(
         r#"{"geometry": {"box": {"min": [0,0,0], "max": [1,1,1], "spacing": 0.5}},
@@ -459,6 +499,19 @@ fn bad_values_are_refused_with_their_place() {
     let table = |time: &str, value: &str| {
         format!(r#"{TRACTION}={{"table": {{"time": {time}, "value": {value}}}}}"#)
     };
+    let changed = |kind: &str, key: &str, value: f64| {
+        let mut material = metal(kind);
+        material[kind][key] = json!(value);
+        format!("material={material}")
+    };
+    let linear = |key, value| changed("linear_elastic", key, value);
+    let steel = |key, value| changed("von_mises", key, value);
+    let copper = |key, value| changed("johnson_cook", key, value);
+    let without = |key| {
+        let mut material = metal("von_mises");
+        material["von_mises"].as_object_mut().unwrap().remove(key);
+        format!("material={material}")
+    };
     #[rustfmt::skip]
     let rows: &[(&str, Code, &str, &[&str])] = &[
         // Unknown and missing keys.
@@ -468,7 +521,7 @@ fn bad_values_are_refused_with_their_place() {
         ("time={}", P, "time", &["missing key `end`"]),
         ("geometry={}", P, "geometry", &["`box`, `boxes`"]),
         ("geometry.sphere={}", P, "geometry", &["only one of `box`, `boxes`", "`sphere`", "see the override"]),
-        ("material=steel", P, "material", &["unknown word `steel`", "`neo_hookean` or `mooney_rivlin`"]),
+        ("material=steel", P, "material", &["unknown word `steel`", "`neo_hookean`", "`johnson_cook`"]),
         ("boundary.top.suport=clamped", P, "boundary.top.suport", &["`support`, `velocity`, `traction`, `pressure`"]),
         ("boundary.leg.x_min.support=roller", P, "boundary.leg.x_min", &["unknown key `x_min`", "see the override"]),
         ("numerics.reference_update=always", P, "numerics.reference_update", &["`never`, `every_step`, `every`"]),
@@ -507,6 +560,23 @@ fn bad_values_are_refused_with_their_place() {
         ("material.neo_hookean.poisson_ratio=0.5", S, "material.neo_hookean.poisson_ratio", &["less than 0.5"]),
         ("material.neo_hookean.poisson_ratio=-1", S, "material.neo_hookean.poisson_ratio", &["more than -1"]),
         ("material={\"mooney_rivlin\": {\"density\": 1, \"youngs_modulus\": 1, \"poisson_ratio\": 0, \"area_share\": 1.5}}", S, "material.mooney_rivlin.area_share", &["from 0 to 1"]),
+        (&linear("poisson_ratio", 0.5), S, "material.linear_elastic.poisson_ratio", &["less than 0.5"]),
+        (&steel("yield_stress", 0.0), S, "material.von_mises.yield_stress", &["above 0 instead of 0"]),
+        (&steel("hardening_modulus", -1.0), S, "material.von_mises.hardening_modulus", &["0 or more, instead of -1"]),
+        (&steel("saturation_stress", 9.0), S, "material.von_mises.saturation_stress", &["not below `yield_stress`, 10, instead of 9"]),
+        (&steel("saturation_exponent", 0.0), S, "material.von_mises.saturation_exponent", &["above 0 instead of 0"]),
+        (&steel("hardness", 1.0), P, "material.von_mises.hardness", &["unknown key `hardness`", "`saturation_stress`"]),
+        (&without("saturation_stress"), S, "material.von_mises.saturation_exponent", &["needs `saturation_stress` too"]),
+        (&without("saturation_exponent"), S, "material.von_mises.saturation_stress", &["needs `saturation_exponent` too"]),
+        (&without("yield_stress"), P, "material.von_mises", &["missing key `yield_stress`"]),
+        (&copper("yield_stress", 0.0), S, "material.johnson_cook.yield_stress", &["above 0"]),
+        (&copper("hardening_exponent", 0.0), S, "material.johnson_cook.hardening_exponent", &["above 0"]),
+        (&copper("hardening_modulus", -1.0), S, "material.johnson_cook.hardening_modulus", &["0 or more"]),
+        (&copper("rate_coefficient", -0.1), S, "material.johnson_cook.rate_coefficient", &["0 or more"]),
+        (&copper("reference_strain_rate", 0.0), S, "material.johnson_cook.reference_strain_rate", &["above 0"]),
+        (&copper("softening_exponent", -1.0), S, "material.johnson_cook.softening_exponent", &["above 0"]),
+        (&copper("transition_temperature", 1356.2), S, "material.johnson_cook.transition_temperature", &["less than `melting_temperature`, 1356.2, instead of 1356.2"]),
+        (&copper("melting_temperature", 0.0), S, "material.johnson_cook.melting_temperature", &["above 0"]),
         // Geometry.
         ("geometry.box.spacing=0", S, "geometry.box.spacing", &["above 0"]),
         ("geometry.box.spacing=[0.5, -1, 0.5]", S, "geometry.box.spacing[1]", &["above 0"]),
@@ -568,7 +638,7 @@ fn bad_values_are_refused_with_their_place() {
         ("probes.top centre=[0, 6, 0]", S, "probes.top centre", &["is not a name"]),
         ("output.history_interval=0", S, "output.history_interval", &["above 0"]),
         ("output.field_interval=-1", S, "output.field_interval", &["above 0"]),
-        ("output.fields=[\"velocity\", \"temperature\"]", S, "output.fields[1]", &["no field `temperature`", "`cauchy_stress`"]),
+        ("output.fields=[\"velocity\", \"colour\"]", S, "output.fields[1]", &["no field `colour`", "`cauchy_stress`"]),
         ("output.fields=[\"velocity\", \"velocity\"]", S, "output.fields[1]", &["twice"]),
         // Overrides that have no place.
         ("time.end", A, "", &["`time.end`", "expected `path=value`"]),
@@ -607,6 +677,34 @@ fn bad_values_are_refused_with_their_place() {
             );
         }
     }
+}
+
+#[test]
+fn conditions_for_heat_need_heat() {
+    let heat = r#"heat={"specific_heat": 1, "reference_temperature": 293}"#;
+    for (key, value) in [
+        ("heat_flux", "1"),
+        ("temperature", "300"),
+        (
+            "convection",
+            r#"{"coefficient": 1, "ambient_temperature": 300}"#,
+        ),
+    ] {
+        let condition = format!("boundary.x_max.{key}={value}");
+        example("elastic_cube", &[heat, &condition]).unwrap_or_else(|e| panic!("{e}"));
+        let error = example("elastic_cube", &[&condition]).unwrap_err();
+        assert!(
+            error.to_string().contains("needs the section `heat`"),
+            "{error}"
+        );
+        let path = format!("boundary.x_max.{key}");
+        assert_eq!(error.place().path.as_deref(), Some(path.as_str()));
+    }
+    let error = example("elastic_cube", &["initial.temperature=300"]).unwrap_err();
+    assert!(
+        error.to_string().contains("add a section `heat`"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -162,6 +162,26 @@ impl Boundary {
         }
     }
 
+    /// What convection adds to the fastest decay of a temperature [W/(m^3 K)]: the largest h A/V_R of a
+    /// particle. Patches that meet count as if their worst particles were the same.
+    pub fn convection_rate(&self, reference: &Reference, t: f64, inputs: &InputValues) -> f64 {
+        let mut total = 0.0;
+        for flow in &self.heat.flows {
+            let Kind::Convection { coefficient, .. } = &flow.kind else {
+                continue;
+            };
+            let place = (flow.patch, Quantity::ConvectionCoefficient);
+            let members = self.members[flow.patch].iter().enumerate();
+            total += members.fold(0.0, |most: f64, (index, member)| {
+                // A value that is not admissible stops the step that uses it.
+                let h = self.checked(coefficient, place, index, t, inputs);
+                let [h] = h.unwrap_or([0.0]);
+                most.max(h * member.area / reference.volume.get(member.slot)[0])
+            });
+        }
+        total
+    }
+
     /// Adds V_R r_R at time `t`; returns its sum.
     fn add_source(&self, heat: &mut Array<1>, reference: &Reference, t: f64) -> Result<f64> {
         let Some(source) = &self.heat.source else {

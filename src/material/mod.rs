@@ -1,12 +1,20 @@
 //! Constitutive laws at one point, as small `Copy` values written once over a lane.
 
+mod hencky;
+mod johnson_cook;
+mod linear_elastic;
 mod mooney_rivlin;
 mod neo_hookean;
 mod thermal;
+mod von_mises;
 
+pub use hencky::Hencky;
+pub use johnson_cook::JohnsonCook;
+pub use linear_elastic::LinearElastic;
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
 pub use thermal::Thermal;
+pub use von_mises::VonMises;
 
 use crate::lane::Lane;
 use crate::math::{Mat3, cofactor, dot, largest_eigenvalue, mat_mul_t, scale9};
@@ -121,6 +129,12 @@ pub enum Law {
     NeoHookean(NeoHookean),
     /// Mooney-Rivlin.
     MooneyRivlin(MooneyRivlin),
+    /// Linear elasticity.
+    LinearElastic(LinearElastic),
+    /// Hencky's elasticity with von Mises plasticity.
+    VonMises(Hencky<VonMises>),
+    /// Hencky's elasticity with Johnson and Cook's plasticity.
+    JohnsonCook(Hencky<JohnsonCook>),
 }
 
 /// Runs an expression with the scene's law bound to a name.
@@ -129,6 +143,9 @@ macro_rules! with_law {
         match $law {
             $crate::material::Law::NeoHookean($name) => $body,
             $crate::material::Law::MooneyRivlin($name) => $body,
+            $crate::material::Law::LinearElastic($name) => $body,
+            $crate::material::Law::VonMises($name) => $body,
+            $crate::material::Law::JohnsonCook($name) => $body,
         }
     };
 }
@@ -150,14 +167,20 @@ impl Law {
     }
     fn new(material: &crate::scene::Material, softening: f64) -> Self {
         use crate::scene::Material as M;
+        let (_, [density, youngs_modulus, poisson_ratio]) = material.elastic();
+        let moduli = Moduli::new(youngs_modulus, poisson_ratio, density).softened(softening);
         match material {
-            M::NeoHookean(m) => Law::NeoHookean(NeoHookean(
-                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density).softened(softening),
-            )),
-            M::MooneyRivlin(m) => Law::MooneyRivlin(MooneyRivlin::new(
-                Moduli::new(m.youngs_modulus, m.poisson_ratio, m.density).softened(softening),
-                m.area_share,
-            )),
+            M::NeoHookean(_) => Law::NeoHookean(NeoHookean(moduli)),
+            M::MooneyRivlin(m) => Law::MooneyRivlin(MooneyRivlin::new(moduli, m.area_share)),
+            M::LinearElastic(_) => Law::LinearElastic(LinearElastic(moduli)),
+            M::VonMises(m) => Law::VonMises(Hencky {
+                moduli,
+                surface: VonMises::new(m),
+            }),
+            M::JohnsonCook(m) => Law::JohnsonCook(Hencky {
+                moduli,
+                surface: JohnsonCook::new(m),
+            }),
         }
     }
     /// Density rho_R [kg/m^3].
@@ -278,5 +301,12 @@ mod tests {
         for share in [0.0, 0.5, 1.0] {
             check(MooneyRivlin::new(moduli, share), moduli);
         }
+        let surface = VonMises {
+            yield_stress: 1e9,
+            hardening_modulus: 0.0,
+            saturation: 0.0,
+            saturation_exponent: 0.0,
+        };
+        check(Hencky { moduli, surface }, moduli);
     }
 }

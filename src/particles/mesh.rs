@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Face, NONE, Particles, Shape, Share, patches, surface};
+use super::{Face, MeshFile, NONE, Particles, Shape, Share, patches, surface};
 use crate::error::{Code, Error, Result};
 use crate::math::*;
 use crate::scene::PatchSelection;
@@ -183,6 +183,22 @@ impl Cell {
     pub fn nodes(&self) -> &[u32] {
         &self.nodes[..self.kind.corners()]
     }
+    /// The same cell with other numbers for its corners.
+    pub(super) fn renumber(&mut self, number: impl Fn(u32) -> u32) {
+        for node in &mut self.nodes[..self.kind.corners()] {
+            *node = number(*node);
+        }
+    }
+    /// The same cell from the other hand.
+    pub(super) fn reversed(&self) -> Self {
+        let n = self.nodes;
+        let nodes = match self.kind {
+            CellKind::Tetrahedron => [n[0], n[2], n[1], n[3], NONE, NONE, NONE, NONE],
+            CellKind::Prism => [n[3], n[4], n[5], n[0], n[1], n[2], NONE, NONE],
+            CellKind::Hexahedron => [n[4], n[5], n[6], n[7], n[0], n[1], n[2], n[3]],
+        };
+        Self { nodes, ..*self }
+    }
     /// Corners of its faces, outward; the fourth is `NONE` in a triangle.
     pub(super) fn faces(&self) -> impl Iterator<Item = [u32; 4]> {
         self.kind.faces().iter().map(|face| {
@@ -314,6 +330,18 @@ pub(super) struct Grid {
     pub numbering: Option<Vec<u32>>,
 }
 
+impl From<&MeshFile> for Grid {
+    fn from(file: &MeshFile) -> Self {
+        Self {
+            nodes: file.nodes.clone(),
+            cells: file.cells.clone(),
+            names: file.names.clone(),
+            named: file.named.clone(),
+            numbering: None,
+        }
+    }
+}
+
 impl Particles {
     /// The nodes of a grid as particles.
     ///
@@ -349,7 +377,7 @@ impl Particles {
         let positions: Vec<[f64; 3]> = order.iter().map(|&c| grid.nodes[c as usize]).collect();
         let mut cells = grid.cells;
         for cell in &mut cells {
-            cell.nodes = cell.nodes.map(renumber);
+            cell.renumber(|n| rank[n as usize]);
         }
         check_shapes(&cells, &positions)?;
         let mut volumes = vec![0.0; positions.len()];
@@ -397,7 +425,7 @@ fn check_shapes(cells: &[Cell], positions: &[[f64; 3]]) -> Result<()> {
 }
 
 /// A face's corners in ascending order: the same from both sides.
-fn face_key(mut corners: [u32; 4]) -> [u32; 4] {
+pub(super) fn face_key(mut corners: [u32; 4]) -> [u32; 4] {
     corners.sort_unstable();
     corners
 }

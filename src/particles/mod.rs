@@ -3,6 +3,7 @@
 //! Boxes become a rectilinear [`lattice`]; everything else is a [`mesh`] of cells whose nodes are the
 //! particles, read from a file or made by [`structured`].
 
+mod gmsh;
 mod lattice;
 mod mesh;
 mod structured;
@@ -15,8 +16,9 @@ use crate::error::{Error, Result};
 use crate::math::*;
 use crate::scene::{Geometry, PatchSelection, Scene};
 
+pub use gmsh::MeshFile;
 pub use lattice::Lattice;
-pub use mesh::{Cell, CellKind, Mesh, Sharing};
+pub use mesh::{CellKind, Mesh, Sharing};
 
 /// The points of a body, in the body's order, which keeps neighbours close in memory.
 #[derive(Debug, Clone)]
@@ -108,6 +110,9 @@ impl Particles {
                 let named: Vec<_> = boxes.iter().map(|(n, b)| (format!("{n}."), b)).collect();
                 Self::of_lattice(&named, &scene.patches)
             }
+            Geometry::Cylinder(c) => Self::of_grid(structured::cylinder(c), &scene.patches),
+            Geometry::PerforatedBox(b) => Self::of_grid(structured::perforated(b), &scene.patches),
+            Geometry::Mesh(m) => Self::of_grid(mesh::Grid::from(m.content()?), &scene.patches),
         }
     }
 

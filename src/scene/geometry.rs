@@ -2,15 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::de::value::SeqAccessDeserializer;
 use serde::{Deserialize, Deserializer, Serialize, de};
+use xxhash_rust::xxh3::xxh3_64;
 
 use super::numerics::Neighbours;
 use super::validate::{ROUND_OFF, finite, key, listed, positive, require, valid_name};
 use super::value;
 use crate::error::{Code, Error, Result};
+use crate::particles::MeshFile;
 
 /// Memory of a simulation per particle [bytes], with 18 neighbours.
 const BYTES_PER_PARTICLE: f64 = 1300.0;
@@ -19,7 +24,7 @@ const BYTES_PER_PAIR: f64 = 24.0;
 /// Particles are numbered in 32 bits, with room for flags.
 const MAX_PARTICLES: f64 = (1u64 << 31) as f64;
 
-/// The body: one box, or a union of boxes on one rectilinear lattice.
+/// The body: boxes on a lattice, a structured body of hexahedra, or a mesh from a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Geometry {
@@ -27,6 +32,153 @@ pub enum Geometry {
     Box(BoxGeometry),
     /// Named boxes that share faces; the exposed part of a face is the patch `<box>.x_min` and so on.
     Boxes(BTreeMap<String, BoxGeometry>),
+    /// A cylinder or a sector of one; its faces are the patches `bottom`, `top`, `side` and, of a
+    /// sector, `start` (the plane of angle 0) and `end`.
+    Cylinder(CylinderGeometry),
+    /// A box with round through-holes; its faces are the patches `x_min` ... `z_max` and `holes`.
+    PerforatedBox(PerforatedBox),
+    /// A mesh of tetrahedra, hexahedra and prisms from a file; its named surfaces are the patches.
+    Mesh(MeshGeometry),
+}
+
+/// A cylinder of hexahedra: in the section a square core inside rings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderGeometry {
+    /// Centre of the bottom [m].
+    #[serde(default)]
+    pub base: [f64; 3],
+    /// Direction from the bottom to the top.
+    #[serde(default)]
+    pub axis: Axis,
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius: f64,
+    /// Length along the axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub length: f64,
+    /// The whole cylinder or a part of it. Angles count from the axis after `axis` (X for Z) to the
+    /// one after that.
+    #[serde(default)]
+    pub sector: Sector,
+    /// Cells across the core and across the rings, n: a quarter has 3 n^2 + 3 n + 1 particles in each
+    /// section. In a wedge, cells along the radius.
+    #[schemars(range(min = 1))]
+    pub divisions: u32,
+    /// Cells along the axis.
+    #[schemars(range(min = 1))]
+    pub layers: u32,
+    /// Graded spacing along the axis, from the bottom to the top.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grading: Option<Grading>,
+    /// Graded width of the rings, outwards; in a wedge from the axis. Wide cells at the axis of a thin
+    /// wedge allow longer time steps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radial_grading: Option<Grading>,
+    /// Radius along the axis: [fraction of the length, factor on the radius], linear between; begins
+    /// at 0 and ends at 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub taper: Vec<[f64; 2]>,
+}
+
+/// A mesh from a file of Gmsh (`.msh`, version 2.2 or 4.1, text or binary): the nodes are the
+/// particles, and physical surfaces the patches; without any the whole surface is the patch `surface`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshGeometry {
+    /// Path of the file, relative to the scene's file, or to the working directory for a scene without
+    /// a file.
+    pub file: String,
+    /// Metres per unit of the file, such as 1e-3 for millimetres.
+    #[serde(default = "one")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub scale: f64,
+    #[serde(skip)]
+    content: Option<Content>,
+}
+
+/// What was read from a mesh file. Equal content has equal hashes.
+#[derive(Clone)]
+struct Content {
+    hash: u64,
+    mesh: Arc<MeshFile>,
+}
+
+impl PartialEq for Content {
+    fn eq(&self, other: &Self) -> bool {
+        self.hash == other.hash
+    }
+}
+
+impl fmt::Debug for Content {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Content({:016x})", self.hash)
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A coordinate axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    /// X.
+    X,
+    /// Y.
+    Y,
+    /// Z.
+    #[default]
+    Z,
+}
+
+/// A part of a cylinder.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Sector {
+    /// All of it.
+    #[default]
+    Full,
+    /// 0 to 180 degrees.
+    Half,
+    /// 0 to 90 degrees.
+    Quarter,
+    /// 0 to an angle below 180 degrees, of prisms around the axis.
+    Wedge(#[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 180))] f64),
+}
+
+/// A box with a grid of round through-holes, each in the middle of its tile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PerforatedBox {
+    /// Lower corner [m].
+    pub min: [f64; 3],
+    /// Upper corner [m].
+    pub max: [f64; 3],
+    /// Direction of the holes.
+    #[serde(default)]
+    pub along: Axis,
+    /// Tiles along the two axes after `along` (X and Y for Z).
+    pub tiles: [u32; 2],
+    /// Diameter of the holes [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub diameter: f64,
+    /// Tiles without a hole, counted from 0.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub solid: Vec<[u32; 2]>,
+    /// Cells along each edge of a tile, and around a quarter of a hole.
+    #[schemars(range(min = 1))]
+    pub divisions: u32,
+    /// Cells from a hole to the edge of its tile.
+    #[schemars(range(min = 1))]
+    pub rings: u32,
+    /// Cells along the holes.
+    #[schemars(range(min = 1))]
+    pub layers: u32,
+    /// Graded spacing along the holes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grading: Option<Grading>,
 }
 
 /// An axis-parallel box with particles on a lattice that includes its boundary.
@@ -184,6 +336,163 @@ impl AxisGrading {
     }
 }
 
+impl Axis {
+    /// The two axes across, and the axis: a right-handed triple.
+    pub fn directions(self) -> [usize; 3] {
+        match self {
+            Axis::X => [1, 2, 0],
+            Axis::Y => [2, 0, 1],
+            Axis::Z => [0, 1, 2],
+        }
+    }
+}
+
+impl MeshGeometry {
+    /// A mesh file that is yet to be [loaded](Self::load).
+    pub fn new(file: impl Into<String>, scale: f64) -> Self {
+        Self {
+            file: file.into(),
+            scale,
+            content: None,
+        }
+    }
+
+    /// Reads the file, relative to a folder; afterwards `file` is the whole path.
+    ///
+    /// # Errors
+    /// [`Code::Io`] if it cannot be read, [`Code::Parse`] with the line and the element if it is not a
+    /// mesh that a body can be made of, [`Code::InvalidScene`] for a bad scale.
+    pub fn load(&mut self, folder: &Path) -> Result<()> {
+        const PATH: &str = "geometry.mesh.file";
+        positive("geometry.mesh.scale", self.scale)?;
+        let path = folder.join(&self.file);
+        // The whole path, so that the scene means the same file wherever it is written to.
+        let path = std::path::absolute(&path).unwrap_or(path);
+        let bytes = read_file(&path).map_err(|e| e.at_path(PATH))?;
+        let mesh = MeshFile::read(&bytes, self.scale)
+            .map_err(|e| e.with_note(&format!("in {}", path.display())).at_path(PATH))?;
+        self.file = path.to_string_lossy().into_owned();
+        self.content = Some(Content {
+            hash: xxh3_64(&bytes),
+            mesh: Arc::new(mesh),
+        });
+        Ok(())
+    }
+
+    /// What the file holds.
+    ///
+    /// # Errors
+    /// [`Code::InvalidScene`] if it was not loaded.
+    pub fn content(&self) -> Result<&MeshFile> {
+        match &self.content {
+            Some(content) => Ok(&content.mesh),
+            None => Err(Error::scene(
+                "geometry.mesh",
+                "the file is not loaded: a mesh that is put into a scene in code needs `load` first",
+            )),
+        }
+    }
+
+    /// Hash of the file's content; 0 before it is loaded.
+    pub fn content_hash(&self) -> u64 {
+        self.content.as_ref().map_or(0, |c| c.hash)
+    }
+}
+
+/// Reads a file that is not too large to be a mesh.
+fn read_file(path: &Path) -> Result<Vec<u8>> {
+    /// About 2e7 nodes as text; a device or a wrong file stops here.
+    const MOST: u64 = 4 << 30;
+    let failed = |why: &dyn fmt::Display| {
+        let text = format!("the mesh {} cannot be read: {why}", path.display());
+        Error::new(Code::Io, text)
+    };
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(|e| failed(&e))?;
+    if file.metadata().is_ok_and(|m| m.is_dir()) {
+        return Err(failed(&"it is a folder"));
+    }
+    file.take(MOST + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| failed(&e))?;
+    if bytes.len() as u64 > MOST {
+        return Err(failed(&"it is larger than 4 GiB"));
+    }
+    Ok(bytes)
+}
+
+impl CylinderGeometry {
+    /// Names of the faces that it has.
+    pub fn faces(&self) -> Vec<String> {
+        let all: &[&str] = match self.sector {
+            Sector::Full => &["bottom", "top", "side"],
+            _ => &["bottom", "top", "side", "start", "end"],
+        };
+        all.iter().map(|f| (*f).to_owned()).collect()
+    }
+    /// The taper at a fraction of the length.
+    pub(crate) fn radius_factor(&self, s: f64) -> f64 {
+        let after = self.taper.partition_point(|[at, _]| *at < s);
+        match (self.taper.get(after.wrapping_sub(1)), self.taper.get(after)) {
+            (Some([p, f]), Some([q, g])) => f + (s - p) / (q - p) * (g - f),
+            (None, Some([_, f])) | (Some([_, f]), None) => *f,
+            (None, None) => 1.0,
+        }
+    }
+    /// About how many particles it has; exact but for a wedge.
+    fn particles(&self) -> f64 {
+        let n = f64::from(self.divisions);
+        let section = match self.sector {
+            Sector::Full => 12.0 * n * n + 4.0 * n + 1.0,
+            Sector::Half => 6.0 * n * n + 4.0 * n + 1.0,
+            Sector::Quarter => 3.0 * n * n + 3.0 * n + 1.0,
+            Sector::Wedge(angle) => 1.0 + 2.0 * n + 0.5 * n * n * angle.to_radians(),
+        };
+        section * (Grading::cells(self.grading.as_ref(), f64::from(self.layers)) + 1.0)
+    }
+}
+
+impl PerforatedBox {
+    /// Names of the faces across the holes and of the holes.
+    pub(crate) fn side_names(&self) -> Vec<String> {
+        let [u, v, _] = self.along.directions();
+        let mut names = Vec::new();
+        for axis in [u, v] {
+            names.extend(axis_faces(axis));
+        }
+        names.push("holes".to_owned());
+        names
+    }
+    /// Names of the faces that the holes go through.
+    pub(crate) fn end_names(&self) -> [String; 2] {
+        axis_faces(self.along.directions()[2])
+    }
+    /// Names of the faces that it has.
+    pub fn faces(&self) -> Vec<String> {
+        let mut faces: Vec<String> = (0..3).flat_map(axis_faces).collect();
+        if self.holes() > 0.0 {
+            faces.push("holes".to_owned());
+        }
+        faces
+    }
+    fn holes(&self) -> f64 {
+        f64::from(self.tiles[0]) * f64::from(self.tiles[1]) - self.solid.len() as f64
+    }
+    fn particles(&self) -> f64 {
+        let (k, rings) = (f64::from(self.divisions), f64::from(self.rings));
+        let [p, q] = self.tiles.map(f64::from);
+        let lines = (p + 1.0) * (q * k + 1.0) + (q + 1.0) * (p * k + 1.0) - (p + 1.0) * (q + 1.0);
+        let solid = self.solid.len() as f64 * (k - 1.0) * (k - 1.0);
+        let section = lines + self.holes() * 4.0 * k * rings + solid;
+        section * (Grading::cells(self.grading.as_ref(), f64::from(self.layers)) + 1.0)
+    }
+}
+
+/// Names of the lower and the upper face across an axis.
+fn axis_faces(axis: usize) -> [String; 2] {
+    ["min", "max"].map(|side| format!("{}_{side}", ["x", "y", "z"][axis]))
+}
+
 impl BoxGeometry {
     /// Cells along an axis, as a number that may be too large for an integer.
     pub(crate) fn cells(&self, axis: usize) -> f64 {
@@ -213,35 +522,53 @@ impl Spacing {
 }
 
 impl Geometry {
-    /// The boxes, by name; a single box has none.
+    /// The boxes, by name; a single box has none, and what is no box has no boxes.
     pub fn boxes(&self) -> Vec<(Option<&str>, &BoxGeometry)> {
         match self {
             Geometry::Box(only) => vec![(None, only)],
             Geometry::Boxes(boxes) => boxes.iter().map(|(n, b)| (Some(n.as_str()), b)).collect(),
+            _ => Vec::new(),
         }
     }
 
-    /// Names of the faces, box by box: each is a patch.
+    /// Names of the faces: each is a patch.
     pub fn faces(&self) -> Vec<String> {
-        self.boxes()
-            .into_iter()
-            .flat_map(|(name, _)| {
-                ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"].map(|face| match name {
-                    Some(name) => format!("{name}.{face}"),
-                    None => face.to_owned(),
-                })
-            })
-            .collect()
+        let all = || (0..3).flat_map(axis_faces);
+        match self {
+            Geometry::Box(_) => all().collect(),
+            Geometry::Boxes(boxes) => boxes
+                .keys()
+                .flat_map(|name| all().map(move |face| format!("{name}.{face}")))
+                .collect(),
+            Geometry::Cylinder(cylinder) => cylinder.faces(),
+            Geometry::PerforatedBox(perforated) => perforated.faces(),
+            Geometry::Mesh(mesh) => mesh.content().map_or(Vec::new(), |m| m.names().to_vec()),
+        }
+    }
+
+    /// Reads what the geometry keeps in files, relative to a folder.
+    pub(super) fn load(&mut self, folder: &Path) -> Result<()> {
+        match self {
+            Geometry::Mesh(mesh) => mesh.load(folder),
+            _ => Ok(()),
+        }
     }
 }
 
 pub(super) fn validate(geometry: &Geometry) -> Result<()> {
-    if let Geometry::Boxes(boxes) = geometry {
-        require(
+    match geometry {
+        Geometry::Box(_) => {}
+        Geometry::Boxes(boxes) => require(
             !boxes.is_empty(),
             "geometry.boxes",
             "a body needs at least one box",
-        )?;
+        )?,
+        Geometry::Cylinder(c) => cylinder(c)?,
+        Geometry::PerforatedBox(b) => perforated_box(b)?,
+        Geometry::Mesh(mesh) => {
+            mesh.content()?;
+            positive("geometry.mesh.scale", mesh.scale)?;
+        }
     }
     for (name, b) in geometry.boxes() {
         let path = box_path(name);
@@ -262,6 +589,129 @@ pub(super) fn validate(geometry: &Geometry) -> Result<()> {
         }
     }
     Ok(())
+}
+
+fn at_least_one(path: &str, count: u32) -> Result<()> {
+    require(count > 0, path, "expected at least 1 instead of 0")
+}
+
+fn cylinder(c: &CylinderGeometry) -> Result<()> {
+    const PATH: &str = "geometry.cylinder";
+    let at = |key: &str| format!("{PATH}.{key}");
+    finite(&at("base"), &c.base)?;
+    positive(&at("radius"), c.radius)?;
+    positive(&at("length"), c.length)?;
+    at_least_one(&at("divisions"), c.divisions)?;
+    at_least_one(&at("layers"), c.layers)?;
+    if let Sector::Wedge(angle) = c.sector {
+        require(
+            (0.1..180.0).contains(&angle),
+            &at("sector.wedge"),
+            &format!(
+                "expected an angle of 0.1 degrees or more and less than 180 instead of {angle}"
+            ),
+        )?;
+    }
+    for (key, divided, count) in [
+        ("grading", &c.grading, c.layers),
+        ("radial_grading", &c.radial_grading, c.divisions),
+    ] {
+        counted_grading(&at(key), divided.as_ref(), count)?;
+    }
+    for (i, [place, factor]) in c.taper.iter().enumerate() {
+        let path = format!("{PATH}.taper[{i}]");
+        finite(&path, &[*place, *factor])?;
+        let (rule, holds) = match i {
+            0 => ("0 for the bottom", *place == 0.0),
+            _ if i + 1 == c.taper.len() => ("1 for the top", *place == 1.0),
+            _ => ("more than the place before", true),
+        };
+        let increasing = i == 0 || *place > c.taper[i - 1][0];
+        require(
+            holds && increasing,
+            &format!("{path}[0]"),
+            &format!("expected {rule} instead of {place}"),
+        )?;
+        positive(&format!("{path}[1]"), *factor)?;
+    }
+    require(
+        c.taper.len() != 1,
+        &at("taper"),
+        "expected at least two entries, at 0 and at 1",
+    )
+}
+
+/// A grading of a given number of divisions; a list of fractions must have as many.
+fn counted_grading(path: &str, divided: Option<&Grading>, count: u32) -> Result<()> {
+    let Some(divided) = divided else {
+        return Ok(());
+    };
+    grading(path, divided)?;
+    let cells = Grading::cells(Some(divided), f64::from(count));
+    require(
+        cells == f64::from(count),
+        path,
+        &format!("the fractions make {cells} divisions, not {count}"),
+    )
+}
+
+fn perforated_box(b: &PerforatedBox) -> Result<()> {
+    const PATH: &str = "geometry.perforated_box";
+    let at = |key: &str| format!("{PATH}.{key}");
+    finite(&at("min"), &b.min)?;
+    finite(&at("max"), &b.max)?;
+    for axis in 0..3 {
+        let edge = b.max[axis] - b.min[axis];
+        require(
+            edge.is_finite() && edge > 0.0,
+            &at(&format!("max[{axis}]")),
+            &format!(
+                "expected more than min[{axis}] = {} instead of {}",
+                b.min[axis], b.max[axis]
+            ),
+        )?;
+    }
+    for (i, tiles) in b.tiles.into_iter().enumerate() {
+        at_least_one(&at(&format!("tiles[{i}]")), tiles)?;
+    }
+    for (key, count) in [
+        ("divisions", b.divisions),
+        ("rings", b.rings),
+        ("layers", b.layers),
+    ] {
+        at_least_one(&at(key), count)?;
+    }
+    positive(&at("diameter"), b.diameter)?;
+    let [u, v, _] = b.along.directions();
+    for (axis, tiles) in [u, v].into_iter().zip(b.tiles) {
+        let tile = (b.max[axis] - b.min[axis]) / f64::from(tiles);
+        require(
+            b.diameter < tile,
+            &at("diameter"),
+            &format!(
+                "expected less than the tiles' width {tile} along {} instead of {}",
+                ["x", "y", "z"][axis],
+                b.diameter
+            ),
+        )?;
+    }
+    for (i, tile) in b.solid.iter().enumerate() {
+        let path = at(&format!("solid[{i}]"));
+        require(
+            tile[0] < b.tiles[0] && tile[1] < b.tiles[1],
+            &path,
+            &format!(
+                "there is no tile {tile:?}: there are {} by {}, counted from 0",
+                b.tiles[0], b.tiles[1]
+            ),
+        )?;
+        require(
+            !b.solid[..i].contains(tile),
+            &path,
+            "this tile is listed twice",
+        )?;
+    }
+    counted_grading(&at("grading"), b.grading.as_ref(), b.layers)
 }
 
 fn grading(path: &str, grading: &Grading) -> Result<()> {
@@ -399,26 +849,56 @@ pub(super) fn capacity(
     memory: Option<f64>,
 ) -> Result<()> {
     // In f64, as a tiny spacing overflows any integer.
-    let counts = geometry.boxes().into_iter().map(|(name, b)| {
-        let h = b.spacing.per_axis();
-        let count: f64 = (0..3).map(|a| b.cells(a) + 1.0).product();
-        let pairs = match neighbours {
-            Neighbours::Lattice(_) => 0.0,
-            Neighbours::Radius { radius } => {
-                // Cells of a ball around a particle, as far as the box reaches.
-                let reach = (radius + 1.0) * h.into_iter().fold(0.0, f64::max);
-                let ball = 4.19 * reach.powi(3) / (h[0] * h[1] * h[2]);
-                count * ball.min(count)
-            }
-        };
-        (count, pairs, name)
-    });
-    let (mut total, mut bytes, mut most) = (0.0, 0.0, (0.0, None));
-    for (count, pairs, name) in counts {
+    let pairs_within = |count: f64, h: [f64; 3]| match neighbours {
+        Neighbours::Lattice(_) => 0.0,
+        Neighbours::Radius { radius } => {
+            // Cells of a ball around a particle, as far as the body reaches.
+            let reach = (radius + 1.0) * h.into_iter().fold(0.0, f64::max);
+            let ball = 4.19 * reach.powi(3) / (h[0] * h[1] * h[2]);
+            count * ball.min(count)
+        }
+    };
+    let counts: Vec<(f64, f64, String)> = match geometry {
+        Geometry::Box(_) | Geometry::Boxes(_) => geometry
+            .boxes()
+            .into_iter()
+            .map(|(name, b)| {
+                let count: f64 = (0..3).map(|a| b.cells(a) + 1.0).product();
+                let pairs = pairs_within(count, b.spacing.per_axis());
+                (count, pairs, format!("{}.spacing", box_path(name)))
+            })
+            .collect(),
+        Geometry::Cylinder(c) => {
+            let count = c.particles();
+            vec![(
+                count,
+                pairs_within(count, [1.0; 3]),
+                "geometry.cylinder".into(),
+            )]
+        }
+        Geometry::PerforatedBox(b) => {
+            let count = b.particles();
+            vec![(
+                count,
+                pairs_within(count, [1.0; 3]),
+                "geometry.perforated_box".into(),
+            )]
+        }
+        Geometry::Mesh(mesh) => {
+            let count = mesh.content()?.nodes() as f64;
+            vec![(
+                count,
+                pairs_within(count, [1.0; 3]),
+                "geometry.mesh.file".into(),
+            )]
+        }
+    };
+    let (mut total, mut bytes, mut most) = (0.0, 0.0, (0.0, String::new()));
+    for (count, pairs, place) in counts {
         total += count;
         bytes += count * BYTES_PER_PARTICLE + pairs * BYTES_PER_PAIR;
         if count > most.0 {
-            most = (count, name);
+            most = (count, place);
         }
     }
     let amount = |x: f64, unit: f64, digits: usize| match x / unit {
@@ -426,17 +906,16 @@ pub(super) fn capacity(
         large => format!("{large:.1e}"),
     };
     let error = |limit: String| {
-        let place = box_path(most.1);
         Err(Error::new(
             Code::OutOfMemory,
             format!(
-                "this spacing makes about {} particles, which with their neighbours need about {} GB; \
-                 {limit}; choose a larger spacing or fewer neighbours",
+                "this makes about {} particles, which with their neighbours need about {} GB; {limit}; \
+                 choose a larger spacing or fewer neighbours",
                 amount(total, 1.0, 0),
                 amount(bytes, 1e9, 1)
             ),
         )
-        .at_path(format!("{place}.spacing")))
+        .at_path(most.1.clone()))
     };
     if total > MAX_PARTICLES {
         return error(format!("at most {MAX_PARTICLES} particles are possible"));

@@ -22,11 +22,15 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use crate::particles::MeshFile;
 pub use condition::{Condition, Convection, Initial, Support};
 pub use expression::Expression;
-pub use geometry::{AxisGrading, BoxGeometry, Geometry, Grading, Jitter, PatchSelection, Spacing};
+pub use geometry::{
+    Axis, AxisGrading, BoxGeometry, CylinderGeometry, Geometry, Grading, Jitter, MeshGeometry,
+    PatchSelection, PerforatedBox, Sector, Spacing,
+};
 pub use heat::Heat;
-pub use material::{Material, MooneyRivlin, NeoHookean};
+pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
     Limiter, Neighbours, Numerics, Operators, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
 };
@@ -102,21 +106,34 @@ impl Scene {
     /// Parses and validates a scene; `overrides` are `path=value` texts applied to the JSON first,
     /// such as `geometry.box.spacing=0.125` or `boundary.top.traction[1]=5e3`. A value is JSON, or a
     /// text that stands for itself. A key that contains dots is written `boundary["leg.y_max"]` if it
-    /// is not in the JSON yet.
+    /// is not in the JSON yet. Files that the scene names, such as a mesh, are read here, relative to the
+    /// working directory.
     ///
     /// # Errors
     /// [`Code::Parse`] or [`Code::InvalidScene`], with the JSON path;
     /// [`Code::InvalidArgument`] for an override that has no place in the JSON;
+    /// [`Code::Io`] for a mesh file that cannot be read;
     /// [`Code::OutOfMemory`] for more particles than this machine can hold.
     pub fn from_json(text: &str, overrides: &[String]) -> Result<Self> {
-        let scene = parse::parse(text, overrides)?;
+        Self::from_json_in(text, overrides, Path::new(""))
+    }
+
+    /// The same with files relative to a folder.
+    ///
+    /// # Errors
+    /// As [`from_json`](Self::from_json).
+    pub fn from_json_in(text: &str, overrides: &[String], folder: &Path) -> Result<Self> {
+        let mut scene = parse::parse(text, overrides)?;
         scene
-            .validate()
+            .geometry
+            .load(folder)
+            .and_then(|()| scene.validate())
             .map_err(|e| parse::with_override(e, overrides))?;
         Ok(scene)
     }
 
-    /// Reads, parses and validates a scene file; see [`from_json`](Self::from_json).
+    /// Reads, parses and validates a scene file; see [`from_json`](Self::from_json). Files that the
+    /// scene names are relative to its folder.
     ///
     /// # Errors
     /// [`Code::Io`] if the file cannot be read, otherwise as [`from_json`](Self::from_json);
@@ -139,7 +156,8 @@ impl Scene {
                 MOST >> 20
             )));
         }
-        Self::from_json(&text, overrides)
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_json_in(&text, overrides, folder)
             .map_err(|e| e.with_note(&format!("in {}", path.display())))
     }
 }

@@ -67,7 +67,9 @@ impl Scene {
                 ));
             }
             condition::validate(&path, condition).map_err(|e| e.at_boundary(name))?;
-            if let Some(key) = condition.heat() {
+            if self.heat.is_none()
+                && let Some(key) = condition.heat()
+            {
                 return Err(Error::scene(
                     format!("{path}.{key}"),
                     "a condition for heat needs the section `heat`, which switches heat on",
@@ -83,7 +85,12 @@ impl Scene {
             let path = key("probes", name);
             valid_name(&path, name)?;
             finite(&path, point)?;
-            let inside = self.geometry.boxes().iter().any(|(_, b)| {
+            let boxes = self.geometry.boxes();
+            if boxes.is_empty() {
+                // Whether it lies in a curved body is known when its cells are.
+                continue;
+            }
+            let inside = boxes.iter().any(|(_, b)| {
                 (0..3).all(|a| {
                     let slack = ROUND_OFF * (b.max[a] - b.min[a]);
                     (b.min[a] - slack..=b.max[a] + slack).contains(&point[a])
