@@ -885,6 +885,13 @@ mod tests {
                 "numerics.reference_update=every_step",
                 "numerics.weights=tributary",
             ],
+            &["numerics.operators=repaired"],
+            &["numerics.operators=repaired", "numerics.dissipation=false"],
+            &[
+                "numerics.operators=repaired",
+                "numerics.kernel_option=4",
+                "numerics.reference_update=every_step",
+            ],
             &["numerics.state=fj", "numerics.volume_dissipation=0.1"],
             &[
                 "numerics.state=fhj",

@@ -137,4 +137,3 @@ impl Iterator for NeighboursOf<'_> {
         Some((base + self.lane, pair))
     }
 }
-

@@ -72,7 +72,12 @@ impl Kernels<'_> {
         let (r, f_inverse) = pull_back::<T>(token, &self.f_chi, &self.chi, a, b);
         let length = dot(r, r).sqrt() * per_length;
         let [ha, hb] = [a, b].map(|at| T::load(token, self.h, at) * per_length);
-        (r, f_inverse, kernel::slope(length, hb), kernel::slope(length, ha))
+        (
+            r,
+            f_inverse,
+            kernel::slope(length, hb),
+            kernel::slope(length, ha),
+        )
     }
 }
 
@@ -162,4 +167,3 @@ impl Work for PulledBackVectors<'_> {
         }
     }
 }
-

@@ -70,6 +70,11 @@ impl Default for Numerics {
 }
 
 impl Numerics {
+    /// Whether an update recomputes the kernels, and with them the repair of the operators.
+    pub(crate) fn redoes_the_repair(&self) -> bool {
+        self.kernel_option >= 3 && self.reference_update != ReferenceUpdate::Never
+    }
+
     /// The CFL number: the scene's, or the one that is proven stable for the largest number of
     /// neighbours of a particle.
     pub fn cfl_number(&self, neighbours: usize) -> f64 {
@@ -208,6 +213,12 @@ pub(super) fn validate(n: &Numerics) -> Result<()> {
         n.weights == Weights::Unit || matches!(n.operators, None | Some(Operators::Kernel)),
         "numerics.weights",
         "tributary weights belong to the operators `kernel`",
+    )?;
+    require(
+        n.operators != Some(Operators::Mesh) || !n.redoes_the_repair(),
+        "numerics.kernel_option",
+        "options 3 and 4 recompute kernels, and the operators `mesh` have none: set 1 or 2, or the \
+         operators `repaired`",
     )?;
     require(
         n.smoothing_factor > 0.5 && n.smoothing_factor <= 2.0,
