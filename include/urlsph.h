@@ -396,13 +396,14 @@ const char *urlsph_status_text(int32_t status);
 
 // Creates a simulation from the JSON text of a scene.
 //
-// - `json`: NUL-terminated UTF-8.
+// - `json`: NUL-terminated UTF-8. Files that the scene names, such as a mesh, are relative to the
+//   working directory.
 // - `options`, `options_size`: NULL and 0 for the defaults, or the options and their size.
 // - `simulation`: receives the handle; NULL on failure. Release it with `urlsph_destroy`.
 // - `error`, `error_size`: NULL and 0, or receives what went wrong: there is no handle to ask.
 //
 // Errors: `URLSPH_INVALID_ARGUMENT`, `URLSPH_PARSE`, `URLSPH_INVALID_SCENE` with the JSON path or
-// the particle, `URLSPH_OUT_OF_MEMORY`. Any thread, at any time.
+// the particle, `URLSPH_IO` for a mesh file, `URLSPH_OUT_OF_MEMORY`. Any thread, at any time.
 urlsph_status urlsph_create_from_json(const char *json,
                                       const struct urlsph_options *options,
                                       size_t options_size,
@@ -412,7 +413,7 @@ urlsph_status urlsph_create_from_json(const char *json,
 
 // Creates a simulation from the file of a scene.
 //
-// - `path`: NUL-terminated UTF-8.
+// - `path`: NUL-terminated UTF-8. Files that the scene names are relative to its folder.
 // - The others: as for `urlsph_create_from_json`.
 //
 // Errors: those of `urlsph_create_from_json`, and `URLSPH_IO`. Any thread, at any time.

@@ -64,6 +64,7 @@ pub use boundary::{Input, Patch, Quantity};
 pub use error::{Code, Error, Result};
 pub use fields::{Configuration, FIELDS, Field, FieldInfo};
 pub use ledger::{ContactResultant, Energies, HeatResultant, Momenta, Resultant};
+pub use particles::MeshSummary;
 pub use plan::Plan;
 pub use scene::Scene;
 pub use simulation::{Control, ProbeMotion, Progress, Simulation, View};

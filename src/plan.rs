@@ -1,5 +1,6 @@
 //! What a scene will cost and which physics it switches on, for `urlsph check`.
 
+use crate::particles::MeshSummary;
 use crate::scene::{
     Limiter, Neighbours, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights,
 };
@@ -13,6 +14,8 @@ pub struct Plan {
     pub pairs: usize,
     /// Smallest, mean and largest number of neighbours.
     pub neighbours: (usize, f64, usize),
+    /// The cells, where the particles are the nodes of a mesh.
+    pub mesh: Option<MeshSummary>,
     /// Stable time step at the start [s].
     pub stable_step: f64,
     /// Estimated number of steps to the scene's end.

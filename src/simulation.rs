@@ -14,7 +14,7 @@ use crate::material::Law;
 use crate::math::*;
 use crate::neighbours::Graph;
 use crate::parallel::{self, Pool};
-use crate::particles::Particles;
+use crate::particles::{MeshSummary, Particles};
 use crate::plan::Plan;
 use crate::reference::{Reference, Updated};
 use crate::scene::{Numerics, ReferenceUpdate, ScalarFunction, Scene};
@@ -32,6 +32,7 @@ pub struct Simulation {
     pool: Pool,
     boundary: Boundary,
     probes: Probes,
+    mesh: Option<MeshSummary>,
     /// Body's particle to caller's, and back.
     order: Vec<u32>,
     rank: Vec<u32>,
@@ -148,6 +149,7 @@ impl Simulation {
         })?;
         let mut this = Self {
             scene_hash: crate::snapshot::scene_hash(&scene),
+            mesh: particles.mesh_summary(&scene),
             pool,
             probes,
             order: particles.order,
@@ -252,6 +254,7 @@ impl Simulation {
                 self.pair_count() as f64 / self.particle_count() as f64,
                 most,
             ),
+            mesh: self.mesh.clone(),
             stable_step: dt,
             steps: (self.scene.time.end / dt).ceil() as u64,
             memory: self.memory(),
@@ -933,7 +936,23 @@ impl Probes {
         };
         for (name, point) in &scene.probes {
             let weights = particles.interpolation(*point).ok_or_else(|| {
-                Error::scene(format!("probes.{name}"), "the point lies outside the body")
+                let distance = |x: &[f64; 3]| {
+                    let r = sub3(*x, *point);
+                    dot(r, r)
+                };
+                let nearest = particles
+                    .positions
+                    .iter()
+                    .enumerate()
+                    .min_by(|(_, x), (_, y)| distance(x).total_cmp(&distance(y)));
+                let error = Error::scene(
+                    format!("probes.{name}"),
+                    "the point lies outside the body; the nearest particle is named here",
+                );
+                match nearest {
+                    Some((i, x)) => error.at_particle(particles.caller(i), Some(*x)),
+                    None => error,
+                }
             })?;
             this.names.push(name.clone());
             this.weights.push(weights);

@@ -398,6 +398,37 @@ fn everything() -> Value {
     })
 }
 
+/// A geometry of every kind with every key.
+fn geometries() -> Vec<Value> {
+    let mesh = example_path("meshes").with_file_name("cube_tetrahedra.msh");
+    vec![
+        json!({"box": {
+            "min": [0, 0, 0], "max": [1, 1, 1], "spacing": [0.5, 0.5, 0.25],
+            "grading": {"x": 2, "y": [0, 0.25, 1]}, "jitter": {"fraction": 0.1, "seed": 3}
+        }}),
+        json!({"cylinder": {
+            "base": [0, 1, 2], "axis": "y", "radius": 1, "length": 2, "sector": {"wedge": 30},
+            "divisions": 3, "layers": 2, "grading": [0, 0.25, 1], "radial_grading": 0.5,
+            "taper": [[0, 1], [0.5, 0.9], [1, 1]]
+        }}),
+        json!({"cylinder": {"radius": 1, "length": 2, "sector": "quarter", "divisions": 1, "layers": 1}}),
+        json!({"perforated_box": {
+            "min": [0, 0, 0], "max": [2, 1, 1], "along": "z", "tiles": [2, 1], "diameter": 0.5,
+            "solid": [[1, 0]], "divisions": 2, "rings": 1, "layers": 2, "grading": 2
+        }}),
+        json!({"mesh": {"file": mesh, "scale": 2}}),
+    ]
+}
+
+/// The smallest scene with a geometry.
+fn around(geometry: &Value) -> Value {
+    json!({
+        "geometry": geometry,
+        "material": {"neo_hookean": {"density": 1, "youngs_modulus": 1, "poisson_ratio": 0.3}},
+        "time": {"end": 1}
+    })
+}
+
 /// A material of a kind with every key.
 fn metal(kind: &str) -> Value {
     let mut parameters = json!({"density": 8960, "youngs_modulus": 1.24e11, "poisson_ratio": 0.34});
@@ -871,6 +902,14 @@ fn the_schema_accepts_what_the_parser_accepts() {
         assert!(ok(&serde_json::from_str(&text).unwrap()), "{name}");
     }
     assert!(ok(&everything()));
+    for geometry in geometries() {
+        let scene = around(&geometry);
+        assert!(ok(&scene), "{geometry}");
+        let read = Scene::from_json(&scene.to_string(), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let text = serde_json::to_string(&read).unwrap();
+        assert!(ok(&serde_json::from_str(&text).unwrap()), "{text}");
+        assert_eq!(Scene::from_json(&text, &[]).unwrap(), read);
+    }
     for (pointer, bad) in [
         ("/material/mooney_rivlin/density", json!(-1)),
         ("/material/mooney_rivlin/poisson_ratio", json!(0.5)),

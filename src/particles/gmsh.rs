@@ -284,6 +284,9 @@ impl<'a> Reader<'a> {
             self.skip_space();
             let place = self.at;
             let end = self.line();
+            if end.is_empty() {
+                return Err(self.truncated());
+            }
             if end.strip_prefix("$End") != Some(name) {
                 let shown: String = end.chars().take(40).collect();
                 return Err(self.wrong(

@@ -440,9 +440,9 @@ fn write_msh(grid: &mesh::Grid, modern: bool, binary: bool, swapped: bool) -> Ve
     });
     let cells = grid.cells.iter().enumerate().map(|(i, c)| {
         let number = match c.kind {
-            CellKind::Tetrahedron => 4,
-            CellKind::Hexahedron => 5,
-            CellKind::Prism => 6,
+            mesh::CellKind::Tetrahedron => 4,
+            mesh::CellKind::Hexahedron => 5,
+            mesh::CellKind::Prism => 6,
         };
         (3, 1, number, 100 + i, c.nodes().to_vec())
     });

@@ -163,4 +163,15 @@ impl Scene {
         Self::from_json_in(&text, overrides, folder)
             .map_err(|e| e.with_note(&format!("in {}", path.display())))
     }
+
+    /// The scene with the files that it names beside it, and those files by name with their content:
+    /// what a folder needs to run it elsewhere.
+    ///
+    /// # Errors
+    /// [`Code::Io`] for a file that cannot be read, or that has changed since the scene was made.
+    pub fn packed(&self) -> Result<(Self, Vec<(String, Vec<u8>)>)> {
+        let mut scene = self.clone();
+        let files = scene.geometry.pack()?;
+        Ok((scene, files))
+    }
 }

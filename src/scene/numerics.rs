@@ -72,13 +72,15 @@ impl Numerics {
     }
 }
 
-/// 6, 18 or 26 lattice neighbours, or `{"radius": r}`.
+/// 6, 18 or 26 neighbours of a lattice or a mesh, or `{"radius": r}`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields)]
 pub enum Neighbours {
-    /// 6, 18 or 26 neighbours that share a lattice cell.
+    /// Neighbours on a lattice: 6 that share an edge of a cell, 18 that share a face, or 26 that share
+    /// a cell. On a mesh the same as far as the cells go: in tetrahedra all three are the edges.
     Lattice(#[schemars(extend("enum" = [6, 18, 26]))] u8),
-    /// All particles within a radius, in multiples of the largest lattice spacing.
+    /// All particles within a radius, in multiples of the largest lattice spacing; on a mesh, of the
+    /// mean length of the edges at either particle, and only what hangs together within the radius.
     Radius {
         /// Radius over spacing.
         radius: f64,
