@@ -57,12 +57,17 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
     let dissipation = match (n.reconstruction, n.limiter) {
         (Reconstruction::None, _) => "Riemann dissipation D^p, first order",
         (_, Limiter::None) => "Riemann dissipation D^p, linear reconstruction",
+        (_, Limiter::Shock) => "Riemann dissipation D^p, linear reconstruction, shock limiter",
         (_, Limiter::Minmod) => "Riemann dissipation D^p, linear reconstruction, minmod limiter",
         (_, Limiter::Venkatakrishnan) => {
             "Riemann dissipation D^p, linear reconstruction, Venkatakrishnan limiter"
         }
     };
-    feature(n.dissipation, dissipation.to_string());
+    let dissipation = match n.dissipation_coefficient {
+        1.0 => dissipation.to_string(),
+        coefficient => format!("{dissipation} (coefficient {coefficient})"),
+    };
+    feature(n.dissipation, dissipation);
     feature(
         n.state != StateMeasures::F,
         match n.state {

@@ -10,7 +10,7 @@ use urlsph::scene::{
 };
 use urlsph::{Code, Error};
 
-const EXAMPLES: [&str; 10] = [
+const EXAMPLES: [&str; 11] = [
     "column_tension",
     "column_bending",
     "column_twisting",
@@ -21,6 +21,7 @@ const EXAMPLES: [&str; 10] = [
     "slab_heating",
     "homogeneous",
     "l_block_thermal",
+    "punch",
 ];
 
 fn example_path(name: &str) -> PathBuf {
@@ -386,11 +387,11 @@ fn everything() -> Value {
             "gruneisen_exponent": 0.5, "plastic_heat_fraction": 0.9, "source": "1e3*sin(t)"
         },
         "body_force": [0, "-9.81*1100", 0],
-        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "temperature": "300 - X"},
+        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "gradient": "exact", "temperature": "300 - X"},
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
-            "dissipation": true, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
+            "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
@@ -558,6 +559,8 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.reference_update=always", P, "numerics.reference_update", &["`never`, `every_step`, `every`"]),
         ("numerics.reference_update=every", P, "numerics.reference_update.every", &["needs a value"]),
         ("numerics.reference_update=3", P, "numerics.reference_update", &["one of `never`"]),
+        ("initial.gradient=exact", S, "initial.gradient", &["no initial displacement"]),
+        ("initial.gradient=analytic", P, "initial.gradient", &["`discrete` or `exact`"]),
         // Wrong shapes.
         ("time=[3]", P, "time", &["a list, expected an object", "`end`"]),
         ("time.end=soon", P, "time.end", &["expected a number"]),
@@ -655,10 +658,12 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.smoothing_factor=2.1", S, "numerics.smoothing_factor", &["at most 2"]),
         ("numerics.kernel_option=0", S, "numerics.kernel_option", &["1, 2, 3 or 4"]),
         ("numerics.reference_update={\"every\": 0}", S, "numerics.reference_update.every", &["at least 1"]),
+        ("numerics.dissipation_coefficient=0", S, "numerics.dissipation_coefficient", &["more than 0"]),
+        ("numerics={\"dissipation\": false, \"dissipation_coefficient\": 0.5}", S, "numerics.dissipation_coefficient", &["switched off"]),
         ("numerics.volume_dissipation=0.1", S, "numerics.volume_dissipation", &["`fj` or `fhj`"]),
         ("numerics.volume_dissipation=-0.1", S, "numerics.volume_dissipation", &["0 or more"]),
         ("numerics={\"limiter\": \"minmod\", \"reconstruction\": \"none\"}", S, "numerics.limiter", &["to be `linear`"]),
-        ("numerics={\"limiter\": \"minmod\", \"dissipation\": false}", S, "numerics.limiter", &["switched off"]),
+        ("numerics={\"limiter\": \"shock\", \"dissipation\": false}", S, "numerics.limiter", &["switched off"]),
         ("numerics.cfl=0", S, "numerics.cfl", &["more than 0"]),
         ("numerics.cfl=2.5", S, "numerics.cfl", &["at most 2"]),
         ("numerics.time_step=0", S, "numerics.time_step", &["above 0"]),

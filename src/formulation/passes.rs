@@ -541,6 +541,8 @@ pub(super) struct Forces<'a, P, const MODE: u8> {
     pub pairs: P,
     pub input: ForceInput<'a>,
     pub speeds: WaveSpeeds<f64>,
+    /// Share of the dissipation in resolved flow.
+    pub coefficient: f64,
     pub slab: usize,
     pub out: [&'a mut [f64]; 3],
 }
@@ -553,15 +555,17 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             pairs,
             input,
             speeds,
+            coefficient,
             slab,
             mut out,
         } = self;
         let slices = &input.reference.slices;
         let weights = slices.weights();
         let speeds = WaveSpeeds {
-            pressure: T::splat(token, speeds.pressure),
-            shear: T::splat(token, speeds.shear),
+            pressure: T::splat(token, coefficient * speeds.pressure),
+            shear: T::splat(token, coefficient * speeds.shear),
         };
+        let full = T::splat(token, 1.0 / coefficient);
         let far = T::splat(token, f64::INFINITY);
         let (mut power, mut shortest) = (PerSlot::new(0.0), PerSlot::new(f64::INFINITY));
         for (at, a) in lanes_of::<T>(input.reference, slab) {
@@ -572,7 +576,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             if MODE != riemann::OFF {
                 sa = load9::<T>(token, &input.s, a);
             }
-            if MODE == riemann::LINEAR || MODE == riemann::MINMOD {
+            if riemann::reconstructs(MODE) {
                 grad_a = load9::<T>(token, &input.half_grad, a);
             }
             let mut force = zero3::<T>(token);
@@ -586,13 +590,12 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                 let mut f = sub3(mat_vec(&qa, g), mat_vec(&load9(token, &input.q, b), back));
                 if MODE != riemann::OFF {
                     p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(token, &input.s, b), back));
-                    let (half_a, half_b) = if MODE == riemann::CONSTANT {
-                        (zero3(token), zero3(token))
+                    let grad_b = if riemann::reconstructs(MODE) {
+                        load9(token, &input.half_grad, b)
                     } else {
-                        let grad_b = load9(token, &input.half_grad, b);
-                        (mat_vec(&grad_a, p.dx), mat_vec(&grad_b, p.dx))
+                        [zero3(token); 3]
                     };
-                    let jump = riemann::jump::<T, MODE>(&p, half_a, half_b);
+                    let jump = riemann::jump::<T, MODE>(&p, &grad_a, &grad_b, full);
                     let d = riemann::dissipation(&p, jump, speeds);
                     work = work + dot(d, p.dv);
                     f = add3(f, d);

@@ -465,7 +465,9 @@ impl<'a> Reader<'a> {
 
     fn nodes(&mut self, raw: &mut Raw) -> Result<()> {
         let (blocks, count) = (self.size()?, self.size()?);
-        (self.size()?, self.size()?);
+        // The smallest and the largest tag.
+        self.size()?;
+        self.size()?;
         self.announce(raw, count)?;
         for _ in 0..blocks {
             let (dimension, _, parametric) = (self.int()?, self.int()?, self.int()?);
@@ -563,7 +565,9 @@ impl<'a> Reader<'a> {
 
     fn elements(&mut self, raw: &mut Raw) -> Result<()> {
         let (blocks, announced) = (self.size()?, self.size()?);
-        (self.size()?, self.size()?);
+        // The smallest and the largest tag.
+        self.size()?;
+        self.size()?;
         let mut read = 0u64;
         for _ in 0..blocks {
             let place = self.place();

@@ -176,7 +176,7 @@ fn cylinders_satisfy_the_identities() {
             r#""divisions": 5, "sector": {"wedge": 120}"#,
             RIGHT / 0.75,
             10,
-            38,
+            36,
         ),
     ] {
         let volume = 2.0 * 0.25 * polygon(angle, segments);

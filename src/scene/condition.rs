@@ -65,6 +65,21 @@ pub enum Support {
     Antisymmetry,
 }
 
+/// How the initial deformation gradient follows from the displacement.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InitialGradient {
+    /// By the operators from the displaced particles: the two never part. On a surface it is of first order.
+    #[default]
+    Discrete,
+    /// That of the expressions, so that a solution which starts deformed starts from its exact strain.
+    Exact,
+}
+
+fn is_default(gradient: &InitialGradient) -> bool {
+    *gradient == InitialGradient::default()
+}
+
 /// A rigid frictionless plane that particles touch, slide along and leave.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -96,9 +111,12 @@ pub struct Initial {
     /// Velocity [m/s].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vector>,
-    /// Displacement [m]; the deformation gradient follows from it by the discrete gradient.
+    /// Displacement [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displacement: Option<Vector>,
+    /// How the deformation gradient follows from the displacement.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub gradient: InitialGradient,
     /// Temperature [K]; needs the section `heat`, whose reference temperature is the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Scalar>,
@@ -186,6 +204,11 @@ pub(super) fn wall(path: &str, wall: &Wall) -> Result<()> {
 }
 
 pub(super) fn initial(initial: &Initial) -> Result<()> {
+    require(
+        initial.displacement.is_some() || is_default(&initial.gradient),
+        "initial.gradient",
+        "there is no initial displacement that has a gradient: add `initial.displacement`",
+    )?;
     if let Some(temperature) = &initial.temperature {
         let path = "initial.temperature";
         require(

@@ -23,7 +23,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::particles::MeshFile;
-pub use condition::{Condition, Convection, Initial, Support, Wall};
+pub use condition::{Condition, Convection, Initial, InitialGradient, Support, Wall};
 pub use expression::Expression;
 pub use geometry::{
     Axis, AxisGrading, BoxGeometry, CylinderGeometry, Geometry, Grading, Jitter, MeshGeometry,
@@ -105,6 +105,9 @@ pub struct Output {
     pub fields: Option<Vec<String>>,
 }
 
+/// Files by name, with their content.
+pub type Files = Vec<(String, Vec<u8>)>;
+
 impl Scene {
     /// Parses and validates a scene; `overrides` are `path=value` texts applied to the JSON first,
     /// such as `geometry.box.spacing=0.125` or `boundary.top.traction[1]=5e3`. A value is JSON, or a
@@ -169,9 +172,19 @@ impl Scene {
     ///
     /// # Errors
     /// [`Code::Io`] for a file that cannot be read, or that has changed since the scene was made.
-    pub fn packed(&self) -> Result<(Self, Vec<(String, Vec<u8>)>)> {
+    pub fn packed(&self) -> Result<(Self, Files)> {
         let mut scene = self.clone();
         let files = scene.geometry.pack()?;
         Ok((scene, files))
+    }
+
+    /// The scene with the hash of each file's content in place of its path: equal for equal bodies,
+    /// wherever their files are.
+    pub(crate) fn of_content(&self) -> Self {
+        let mut scene = self.clone();
+        if let Geometry::Mesh(mesh) = &mut scene.geometry {
+            mesh.file = format!("{:016x}", mesh.content_hash());
+        }
+        scene
     }
 }
