@@ -15,24 +15,30 @@ use crate::simulation::Simulation;
 
 pub(super) type Xml = Writer<Vec<u8>>;
 
-/// A unit and the type of the variables that have it: name, exponents of kg, m and s, type.
-type UnitRow = (&'static str, [i32; 3], &'static str);
+/// A unit and the type of the variables that have it: name, exponents of kg, m, s and K, type.
+type UnitRow = (&'static str, [i32; 4], &'static str);
 
 const UNITS: &[UnitRow] = &[
-    ("1", [0, 0, 0], "Dimensionless"),
-    ("s", [0, 0, 1], "Time"),
-    ("m", [0, 1, 0], "Length"),
-    ("m^2", [0, 2, 0], "Area"),
-    ("m^3", [0, 3, 0], "Volume"),
-    ("m/s", [0, 1, -1], "Velocity"),
-    ("kg/m^3", [1, -3, 0], "Density"),
-    ("Pa", [1, -1, -2], "Stress"),
-    ("N", [1, 1, -2], "Force"),
-    ("N.m", [1, 2, -2], "Moment"),
-    ("J", [1, 2, -2], "Energy"),
-    ("J/m^3", [1, -1, -2], "EnergyDensity"),
-    ("kg.m/s", [1, 1, -1], "LinearMomentum"),
-    ("kg.m^2/s", [1, 2, -1], "AngularMomentum"),
+    ("1", [0, 0, 0, 0], "Dimensionless"),
+    ("s", [0, 0, 1, 0], "Time"),
+    ("m", [0, 1, 0, 0], "Length"),
+    ("m^2", [0, 2, 0, 0], "Area"),
+    ("m^3", [0, 3, 0, 0], "Volume"),
+    ("m/s", [0, 1, -1, 0], "Velocity"),
+    ("kg/m^3", [1, -3, 0, 0], "Density"),
+    ("Pa", [1, -1, -2, 0], "Stress"),
+    ("N", [1, 1, -2, 0], "Force"),
+    ("N.s", [1, 1, -1, 0], "Impulse"),
+    ("N.m", [1, 2, -2, 0], "Moment"),
+    ("J", [1, 2, -2, 0], "Energy"),
+    ("J/m^3", [1, -1, -2, 0], "EnergyDensity"),
+    ("kg.m/s", [1, 1, -1, 0], "LinearMomentum"),
+    ("kg.m^2/s", [1, 2, -1, 0], "AngularMomentum"),
+    ("K", [0, 0, 0, 1], "Temperature"),
+    ("W/m^2", [1, 0, -3, 0], "HeatFlux"),
+    ("W/(m^2.K)", [1, 0, -3, -1], "HeatTransferCoefficient"),
+    ("W", [1, 2, -3, 0], "HeatFlow"),
+    ("J/K", [1, 2, -2, -1], "Entropy"),
 ];
 
 fn unit(variable: &Variable) -> Result<&'static UnitRow> {
@@ -199,7 +205,7 @@ fn units(xml: &mut Xml, table: &Table, type_element: &str) -> io::Result<()> {
         for (name, exponents, _) in &used {
             element(xml, "Unit", &[("name", name)], |xml| {
                 let texts = exponents.map(|e| e.to_string());
-                let base: Vec<(&str, &str)> = ["kg", "m", "s"]
+                let base: Vec<(&str, &str)> = ["kg", "m", "s", "K"]
                     .into_iter()
                     .zip(texts.iter().map(String::as_str))
                     .filter(|(_, e)| *e != "0")

@@ -17,7 +17,7 @@
 //! | Riemann dissipation and reconstruction | 59, 60 | `formulation::riemann`, `formulation::limiter` |
 //! | Runge-Kutta, time step | 61-63 | `integrator`, `simulation` |
 //! | angular-momentum projection | 64-67 | `formulation::angular_momentum` |
-//! | supports, loads, resultants | | `boundary` |
+//! | supports, loads, heat, contact, resultants | | `boundary` |
 //!
 //! ```
 //! use urlsph::{Scene, Simulation};
@@ -63,7 +63,7 @@ mod snapshot;
 pub use boundary::{Input, Patch, Quantity};
 pub use error::{Code, Error, Result};
 pub use fields::{Configuration, FIELDS, Field, FieldInfo};
-pub use ledger::{Energies, HeatResultant, Momenta, Resultant};
+pub use ledger::{ContactResultant, Energies, HeatResultant, Momenta, Resultant};
 pub use particles::MeshSummary;
 pub use plan::Plan;
 pub use scene::Scene;

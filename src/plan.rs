@@ -95,6 +95,10 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
         n.angular_momentum_projection,
         "angular-momentum projection".to_string(),
     );
+    feature(
+        !scene.contact.is_empty(),
+        "contact with rigid planes".to_string(),
+    );
     feature(scene.body_force.is_some(), "body force".to_string());
     (on, off)
 }

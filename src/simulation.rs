@@ -1,13 +1,15 @@
 //! A running simulation: the time step is written here, once.
 
-use crate::boundary::{Boundary, Input, InputValues, Patch, Quantity};
+use crate::boundary::{Approach, Boundary, Input, InputValues, Patch, Quantity, WallState};
 use crate::error::{Code, Error, Result};
 use crate::fields::Field;
 use crate::formulation::angular_momentum;
 use crate::formulation::url::{Breakdown, Evaluation, State, Trouble, Url};
 use crate::integrator::{ANGULAR_ARMS, SSP_RK3};
 use crate::layout::{Array, Layout};
-use crate::ledger::{Accounts, Energies, HeatResultant, Momenta, Resultant};
+use crate::ledger::{
+    Accounts, ContactResultant, Energies, HeatResultant, Momenta, Resultant, Resultants,
+};
 use crate::material::Law;
 use crate::math::*;
 use crate::neighbours::Graph;
@@ -43,14 +45,14 @@ pub struct Simulation {
     reference: Reference,
     inputs: InputValues,
     accounts: Accounts,
+    walls: Vec<WallState>,
     // Scratch: recomputed from the state.
     url: Url,
     start: State,
     velocity_before: Option<Array<3>>,
+    approach: Approach,
     evaluation: Evaluation,
-    resultants: Vec<Resultant>,
-    /// Empty of a body without heat.
-    heat_resultants: Vec<HeatResultant>,
+    resultants: Resultants,
     generation: u64,
     /// Stable step at time 0 [s].
     first_step: f64,
@@ -157,6 +159,8 @@ impl Simulation {
             time: 0.0,
             steps: 0,
             inputs: boundary.start_values(),
+            walls: boundary.walls_at_rest(),
+            approach: Approach::default(),
             boundary,
             accounts: Accounts::default(),
             start: state.clone(),
@@ -167,14 +171,12 @@ impl Simulation {
             reference,
             url,
             evaluation: Evaluation::default(),
-            resultants: Vec::new(),
-            heat_resultants: Vec::new(),
+            resultants: Resultants::default(),
             generation: 0,
             first_step: 0.0,
             scene,
         };
-        this.boundary
-            .constrain(&mut this.state.v, 0.0, &this.inputs)?;
+        let supplied = this.first_impulse()?;
         hold_temperatures(
             &this.boundary,
             &this.url,
@@ -194,11 +196,32 @@ impl Simulation {
         })?;
         this.first_step = this.stable_step();
         let e = &this.evaluation;
-        this.accounts.initial = e.kinetic + e.strain + e.thermal;
-        (this.resultants, this.heat_resultants) = this.compute_resultants()?;
+        this.accounts.initial = e.kinetic + e.strain + e.thermal - supplied;
+        this.resultants = this.compute_resultants()?;
         // A load that has no finite value at the start is an error of the scene, not of its first step.
         this.nodal_forces()?;
         Ok(this)
+    }
+
+    /// Supports and planes take hold of the initial velocity; the energy that they supply.
+    fn first_impulse(&mut self) -> Result<f64> {
+        let Self {
+            pool,
+            boundary,
+            state,
+            reference,
+            inputs,
+            walls,
+            accounts,
+            ..
+        } = self;
+        let held = boundary.constrained_kinetic(&state.v);
+        boundary.constrain(&mut state.v, 0.0, inputs)?;
+        let supports = boundary.constrained_kinetic(&state.v) - held;
+        let contact = pool.install(|| boundary.first_contact(state, walls, reference))?;
+        accounts.external_work += supports;
+        accounts.exchange(contact);
+        Ok(supports + contact.work - contact.dissipation)
     }
 
     fn nodal_forces(&self) -> Result<Array<3>> {
@@ -206,7 +229,7 @@ impl Simulation {
         let (url, state) = (&self.url, &self.state);
         self.pool.install(|| {
             self.boundary
-                .nodal_forces(url, state, &self.reference, now, &self.inputs)
+                .nodal_forces(url, state, &self.reference, now, &self.inputs, &self.walls)
         })
     }
 
@@ -335,7 +358,7 @@ impl Simulation {
         }
         let resultants = self.compute_resultants();
         outcome?;
-        (self.resultants, self.heat_resultants) = resultants?;
+        self.resultants = resultants?;
         Ok(())
     }
 
@@ -385,7 +408,7 @@ impl Simulation {
     /// THE time step: three stages of rates, loads, blend, supports.
     fn step(&mut self, dt: f64, end: f64) -> Result<()> {
         self.start.copy_from(&self.state);
-        let accounts = self.accounts;
+        let (accounts, walls) = (self.accounts, self.walls.clone());
         match self.stages(dt, end) {
             Ok(()) => {
                 self.time = end;
@@ -396,6 +419,7 @@ impl Simulation {
             Err(error) => {
                 self.state.copy_from(&self.start);
                 self.accounts = accounts;
+                self.walls = walls;
                 self.evaluate()?;
                 Err(error)
             }
@@ -410,6 +434,8 @@ impl Simulation {
             reference,
             inputs,
             accounts,
+            walls,
+            approach,
             url,
             start,
             ..
@@ -422,6 +448,8 @@ impl Simulation {
             let diverged = |b: Breakdown, state: &State| diverged(b, state, order, end);
             let mut before = before;
             let held = boundary.constrained_kinetic(&state.v);
+            let wave_speed = url.wave_speeds().pressure;
+            boundary.approach(approach, state, walls, reference, wave_speed, (time, dt))?;
             for (i, stage) in SSP_RK3.into_iter().enumerate() {
                 let stage_time = time + stage.time * dt;
                 let share = stage.weight * dt;
@@ -459,9 +487,11 @@ impl Simulation {
                     url.rates.heat = Some(heat);
                     accounts.heat_in += share * url.heat_power(power?);
                 }
+                boundary.follow(approach, i, &url.rates.force, &state.v, dt);
                 url.advance_stage(state, start, reference, (stage.keep, stage.take), dt);
                 let next = SSP_RK3.get(i + 1).map_or(end, |next| time + next.time * dt);
                 boundary.constrain(&mut state.v, next, inputs)?;
+                boundary.keep_out(approach, i, &mut state.v, walls, next)?;
                 let last = i + 1 == SSP_RK3.len();
                 if last {
                     accounts.plastic += url.commit(state, reference, dt);
@@ -483,6 +513,7 @@ impl Simulation {
             }
             // What the supports did: they held the constrained components against all forces.
             accounts.external_work += boundary.constrained_kinetic(&state.v) - held;
+            accounts.exchange(boundary.settle(approach, &state.v, walls));
             Ok(())
         })
     }
@@ -544,25 +575,29 @@ impl Simulation {
         Ok(Some(old))
     }
 
-    fn compute_resultants(&self) -> Result<(Vec<Resultant>, Vec<HeatResultant>)> {
+    fn compute_resultants(&self) -> Result<Resultants> {
         let now = (self.time, self.stable_step());
         let (url, state, reference) = (&self.url, &self.state, &self.reference);
         self.pool.install(|| {
-            let resultants = self
-                .boundary
-                .resultants(url, state, reference, now, &self.inputs)?;
-            let Some(heat) = &url.rates.heat else {
-                return Ok((resultants, Vec::new()));
+            let (boundary, inputs) = (&self.boundary, &self.inputs);
+            let (patches, contacts) =
+                boundary.resultants(url, state, reference, now, inputs, &self.walls)?;
+            let heat = match &url.rates.heat {
+                None => Vec::new(),
+                Some(heat) => boundary.heat_resultants(
+                    heat,
+                    reference,
+                    |slot| url.evaluated_temperature(slot),
+                    |slot, rate| url.heat_uptake(state, reference, slot, rate),
+                    now,
+                    inputs,
+                )?,
             };
-            let heat = self.boundary.heat_resultants(
+            Ok(Resultants {
+                patches,
                 heat,
-                reference,
-                |slot| url.evaluated_temperature(slot),
-                |slot, rate| url.heat_uptake(state, reference, slot, rate),
-                now,
-                &self.inputs,
-            )?;
-            Ok((resultants, heat))
+                contacts,
+            })
         })
     }
 
@@ -571,7 +606,7 @@ impl Simulation {
     /// # Panics
     /// If `patch` is not an index into [`patches`](Self::patches) of a body with heat.
     pub fn heat_resultant(&self, patch: usize) -> Option<HeatResultant> {
-        (!self.heat_resultants.is_empty()).then(|| self.heat_resultants[patch])
+        (!self.resultants.heat.is_empty()).then(|| self.resultants.heat[patch])
     }
 
     /// Energies now.
@@ -623,7 +658,20 @@ impl Simulation {
     /// # Panics
     /// If `patch` is not an index into [`patches`](Self::patches).
     pub fn resultant(&self, patch: usize) -> Resultant {
-        self.resultants[patch]
+        self.resultants.patches[patch]
+    }
+
+    /// Names of the scene's planes of contact, in the order of [`contact`](Self::contact).
+    pub fn contact_names(&self) -> impl Iterator<Item = &str> {
+        self.boundary.wall_names()
+    }
+
+    /// What a plane of contact does now, and has done since time 0.
+    ///
+    /// # Panics
+    /// If `wall` is not an index into [`contact_names`](Self::contact_names).
+    pub fn contact(&self, wall: usize) -> ContactResultant {
+        self.resultants.contacts[wall]
     }
 
     /// Names of the scene's probes, in the order of [`probe`](Self::probe).
@@ -666,7 +714,7 @@ impl Simulation {
         self.boundary.check_input(index, values)?;
         let old = std::mem::replace(&mut self.inputs[index], values.to_vec());
         match self.compute_resultants() {
-            Ok(resultants) => (self.resultants, self.heat_resultants) = resultants,
+            Ok(resultants) => self.resultants = resultants,
             Err(error) => {
                 self.inputs[index] = old;
                 return Err(error);
@@ -806,6 +854,7 @@ impl Simulation {
             steps: self.steps,
             accounts: self.accounts,
             inputs: self.inputs.clone(),
+            walls: self.walls.clone(),
             state: self.state.clone(),
             updated: self.reference.updated.clone(),
         }
@@ -830,6 +879,7 @@ impl Simulation {
             && snapshot.state.history.is_some() == self.state.history.is_some()
             && shape(&snapshot.updated) == shape(&self.reference.updated)
             && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.walls.len() == self.walls.len()
             && snapshot.time.is_finite();
         if !same_shape {
             return Err(Error::new(
@@ -844,7 +894,7 @@ impl Simulation {
         let restored = self.put(snapshot).and_then(|()| self.compute_resultants());
         match restored {
             Ok(resultants) => {
-                (self.resultants, self.heat_resultants) = resultants;
+                self.resultants = resultants;
                 Ok(())
             }
             Err(error) => {
@@ -859,6 +909,7 @@ impl Simulation {
         self.steps = snapshot.steps;
         self.accounts = snapshot.accounts;
         self.inputs.clone_from(&snapshot.inputs);
+        self.walls.clone_from(&snapshot.walls);
         self.state.copy_from(&snapshot.state);
         if snapshot.updated.is_some() && snapshot.updated != self.reference.updated {
             self.reference.updated.clone_from(&snapshot.updated);

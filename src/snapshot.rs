@@ -2,7 +2,7 @@
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
-use crate::boundary::InputValues;
+use crate::boundary::{InputValues, WallState};
 use crate::error::{Code, Error, Result};
 use crate::formulation::url::State;
 use crate::layout::{Array, Layout};
@@ -20,6 +20,7 @@ pub struct Snapshot {
     pub(crate) steps: u64,
     pub(crate) accounts: Accounts,
     pub(crate) inputs: InputValues,
+    pub(crate) walls: Vec<WallState>,
     pub(crate) state: State,
     pub(crate) updated: Option<Updated>,
 }
@@ -91,6 +92,7 @@ impl Snapshot {
             &mut a.conduction,
             &mut a.external_work,
             &mut a.dissipation,
+            &mut a.contact,
             &mut a.projection,
         ] {
             walk.number(value)?;
@@ -101,6 +103,12 @@ impl Snapshot {
             let length = walk.length(values.len())?;
             values.resize(length, 0.0);
             walk.numbers(values)?;
+        }
+        let walls = walk.length(self.walls.len())?;
+        self.walls.resize_with(walls, WallState::default);
+        for wall in &mut self.walls {
+            walk.number(&mut wall.displacement)?;
+            walk.number(&mut wall.impulse)?;
         }
         let layout = self.state.x.layout();
         walk.array(&mut self.state.x)?;
@@ -181,6 +189,7 @@ impl Snapshot {
             steps: 0,
             accounts: Accounts::default(),
             inputs: Vec::new(),
+            walls: Vec::new(),
             state: State {
                 x: Array::new(layout, [0.0; 3]),
                 v: Array::new(layout, [0.0; 3]),

@@ -47,6 +47,7 @@ enum Source {
     StrainEnergy,
     ExternalWork,
     NumericalDissipation,
+    ContactDissipation,
     Projection,
     ClosureError,
     LinearMomentum,
@@ -55,6 +56,9 @@ enum Source {
     PatchMoment(usize),
     PatchDisplacement(usize),
     PatchVelocity(usize),
+    ContactForce(usize),
+    ContactImpulse(usize),
+    ContactParticles(usize),
     StableStep,
     Steps,
     PatchInitialPositions(usize),
@@ -75,7 +79,7 @@ impl OutputVariable {
     }
     /// Whether the values count something.
     pub fn is_integer(&self) -> bool {
-        self.source == Source::Steps
+        matches!(self.source, Source::Steps | Source::ContactParticles(_))
     }
     /// Whether the values are settled by the geometry and never change.
     pub fn is_fixed(&self) -> bool {
@@ -91,7 +95,10 @@ impl OutputVariable {
     pub fn depends_on_inputs(&self) -> bool {
         matches!(
             self.source,
-            Source::PatchForce(_) | Source::PatchMoment(_) | Source::Field(Field::NodalForce)
+            Source::PatchForce(_)
+                | Source::PatchMoment(_)
+                | Source::ContactForce(_)
+                | Source::Field(Field::NodalForce)
         )
     }
     /// Index of the patch that the quantity belongs to.
@@ -235,6 +242,15 @@ pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
     for (name, text, source) in energies {
         add(format!("energy.{name}"), "J", 1, text.to_owned(), source);
     }
+    if simulation.contact_names().next().is_some() {
+        add(
+            "energy.contact_dissipation".to_owned(),
+            "J",
+            1,
+            "Kinetic energy lost in inelastic contact since time 0".to_owned(),
+            Source::ContactDissipation,
+        );
+    }
     add(
         "momentum.linear".to_owned(),
         "kg.m/s",
@@ -284,6 +300,41 @@ pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
                 unit,
                 3,
                 format!("{text} patch {name}"),
+                source,
+            );
+        }
+    }
+    for (wall, name) in simulation.contact_names().enumerate() {
+        let part = name_part(name);
+        let quantities = [
+            (
+                "force",
+                "N",
+                3,
+                "Force on the body of",
+                Source::ContactForce(wall),
+            ),
+            (
+                "impulse",
+                "N.s",
+                3,
+                "Impulse on the body since time 0 of",
+                Source::ContactImpulse(wall),
+            ),
+            (
+                "particles",
+                "1",
+                1,
+                "Number of particles that touch",
+                Source::ContactParticles(wall),
+            ),
+        ];
+        for (quantity, unit, components, text, source) in quantities {
+            add(
+                format!("contact.{part}.{quantity}"),
+                unit,
+                components,
+                format!("{text} plane {name}"),
                 source,
             );
         }
@@ -423,6 +474,9 @@ impl Reader {
             Source::KineticEnergy => out[0] = self.energies(simulation).kinetic,
             Source::StrainEnergy => out[0] = self.energies(simulation).strain,
             Source::ExternalWork => out[0] = self.energies(simulation).external_work,
+            Source::ContactDissipation => {
+                out[0] = self.energies(simulation).contact_dissipation;
+            }
             Source::NumericalDissipation => {
                 out[0] = self.energies(simulation).numerical_dissipation;
             }
@@ -438,6 +492,9 @@ impl Reader {
             Source::PatchVelocity(p) => {
                 out.copy_from_slice(&self.resultant(simulation, p).mean_velocity);
             }
+            Source::ContactForce(w) => out.copy_from_slice(&simulation.contact(w).force),
+            Source::ContactImpulse(w) => out.copy_from_slice(&simulation.contact(w).impulse),
+            Source::ContactParticles(w) => out[0] = simulation.contact(w).particles as f64,
             Source::StableStep => out[0] = simulation.stable_step(),
             // Exact up to 2^53 steps.
             Source::Steps => out[0] = simulation.steps() as f64,

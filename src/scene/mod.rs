@@ -23,7 +23,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::particles::MeshFile;
-pub use condition::{Condition, Convection, Initial, InitialGradient, Support};
+pub use condition::{Condition, Convection, Initial, InitialGradient, Support, Wall};
 pub use expression::Expression;
 pub use geometry::{
     Axis, AxisGrading, BoxGeometry, CylinderGeometry, Geometry, Grading, Jitter, MeshGeometry,
@@ -59,6 +59,9 @@ pub struct Scene {
     /// Conditions by patch name. A patch without an entry is free of traction.
     #[serde(default)]
     pub boundary: BTreeMap<String, Condition>,
+    /// Rigid frictionless planes by name, which particles touch, slide along and leave.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub contact: BTreeMap<String, Wall>,
     /// Body force per unit initial volume f_R [N/m^3].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_force: Option<Vector>,
