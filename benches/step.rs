@@ -59,6 +59,7 @@ fn options(c: &mut Criterion) {
         ("without dissipation", &["numerics.dissipation=false"]),
         ("first order", &["numerics.reconstruction=none"]),
         ("minmod", &["numerics.limiter=minmod"]),
+        ("shock", &["numerics.limiter=shock"]),
         ("venkatakrishnan", &["numerics.limiter=venkatakrishnan"]),
         ("state {f, j}", &["numerics.state=fj"]),
         ("state {f, h, j}", &["numerics.state=fhj"]),

@@ -49,17 +49,40 @@ def column(name):
     return lambda history: history[name]
 
 
+def change(name):
+    """A column of a history less its first value."""
+    return lambda history: history[name] - history[name][0]
+
+
 def length(name):
     """The Euclidean norm of a vector in a history."""
     return lambda history: np.linalg.norm([history[f"{name}[{i}]"] for i in (1, 2, 3)], axis=0)
 
 
 class Example:
-    """What is drawn: times of the particles, curves, how much displacements are enlarged."""
+    """What is drawn: times of the particles, curves, how much displacements are enlarged; particles
+    are coloured by pressure, or by their temperature above a reference."""
 
-    def __init__(self, times, curves, label, *, enlarge=1, gap=1.2, azimuth=25, size=1.0):
+    def __init__(
+        self, times, curves, label, *, enlarge=1, gap=1.2, azimuth=25, size=1.0, stacked=False, z_up=False,
+        reference_temperature=None
+    ):
         self.times, self.curves, self.label = times, curves, label
         self.enlarge, self.gap, self.azimuth, self.size = enlarge, gap, azimuth, size
+        self.stacked, self.z_up = stacked, z_up
+        self.reference_temperature = reference_temperature
+
+    def colour(self, mesh):
+        """What colours the particles of a state."""
+        if self.reference_temperature is None:
+            return mesh.point_data["pressure"].ravel()
+        return mesh.point_data["temperature"].ravel() - self.reference_temperature
+
+    def unit(self, most):
+        """Name, unit and scale of the colours up to `most`."""
+        if self.reference_temperature is not None:
+            return f"temperature above {self.reference_temperature:g} K", "K", 1
+        return "pressure", *(("Pa", 1) if most < 1e3 else ("kPa", 1e3) if most < 1e6 else ("MPa", 1e6))
 
 
 # Curves: the name in the legend, how it is got from history.csv, its column of expected.csv.
@@ -106,6 +129,87 @@ CASES = {
         gap=0.4,
         azimuth=205,
     ),
+    "swinging_cube": Example(
+        [0.0, 0.0028, 0.0056, 0.0084, 0.0112],
+        [
+            (
+                "$u_x$ at (1, 0, 0)",
+                column("probe.x_face_centre.displacement[1]"),
+                "probe.x_face_centre.displacement[1]",
+            )
+        ],
+        "displacement [m]",
+        enlarge=400,
+        gap=0.4,
+        azimuth=205,
+        reference_temperature=293.15,
+    ),
+    "thermo_wave": Example(
+        [0.0, 0.002, 0.004, 0.006, 0.008, 0.01],
+        [
+            (
+                "$u_x$ at the antinode",
+                column("probe.antinode.displacement[1]"),
+                "probe.antinode.displacement[1]",
+            )
+        ],
+        "displacement [m]",
+        enlarge=2000,
+        gap=0.07,
+        azimuth=0,
+        stacked=True,
+        reference_temperature=293.15,
+    ),
+    "slab_heating": Example(
+        [0.0005, 0.0025, 0.005, 0.01, 0.025, 0.05],
+        [
+            (f"{name}", column(f"probe.{name}.temperature"), f"probe.{name}.temperature")
+            for name in ("surface", "back")
+        ],
+        "temperature [K]",
+        gap=0.07,
+        azimuth=0,
+        stacked=True,
+        reference_temperature=293.15,
+    ),
+    "homogeneous": Example(
+        [0.0, 0.4, 0.6, 1.0],
+        [
+            (
+                "$u_x$ of the free corner",
+                column("probe.corner.displacement[1]"),
+                "probe.corner.displacement[1]",
+            )
+        ],
+        "displacement [m]",
+        enlarge=10,
+        gap=0.4,
+        azimuth=205,
+        reference_temperature=293.15,
+    ),
+    "l_block_thermal": Example(
+        [0.0, 5.0, 15.0, 30.0, 48.0],
+        [
+            ("entropy less that at the start", change("entropy.total"), None),
+            ("produced", column("entropy.production"), None),
+        ],
+        "[J/K]",
+        gap=2.0,
+        size=1.35,
+        reference_temperature=293.15,
+    ),
+    "punch": Example(
+        [0.0, 0.03, 0.05, 0.12],
+        [
+            ("$u_z$ of the corner", column("probe.corner.displacement[3]"), None),
+            ("of the far corner", column("probe.far_corner.displacement[3]"), None),
+        ],
+        "displacement [m]",
+        enlarge=5,
+        gap=0.3,
+        z_up=True,
+        size=1.2,
+    ),
     "l_block": Example(
         [0.0, 5.0, 10.0, 15.0, 20.0],
         [
@@ -127,14 +231,13 @@ def read_table(path):
     return {name: values[:, i] for i, name in enumerate(rows[0])}
 
 
-def read_fields(folder, time):
-    """The written state nearest to a time: time, initial positions, displacements, pressures."""
+def read_fields(folder, time, colour):
+    """The written state nearest to a time: time, initial positions, displacements, colours."""
     sets = xml.etree.ElementTree.parse(folder / "fields.pvd").iter("DataSet")
     nearest = min(sets, key=lambda s: abs(float(s.get("timestep")) - time))
     mesh = meshio.read(folder / nearest.get("file"))
     displacement = mesh.point_data["displacement"]
-    pressure = mesh.point_data["pressure"].ravel()
-    return float(nearest.get("timestep")), mesh.points - displacement, displacement, pressure
+    return float(nearest.get("timestep")), mesh.points - displacement, displacement, colour(mesh)
 
 
 def project(points, azimuth):
@@ -148,27 +251,37 @@ def project(points, azimuth):
 
 def draw_particles(figure, axes, example, folder):
     """States side by side, far particles first."""
-    states = [read_fields(folder, time) for time in example.times]
+    states = [read_fields(folder, time, example.colour) for time in example.times]
     most = np.quantile(np.abs(np.concatenate([state[3] for state in states])), 0.99)
-    unit, scale = ("Pa", 1) if most < 1e3 else ("kPa", 1e3) if most < 1e6 else ("MPa", 1e6)
+    name, unit, scale = example.unit(most)
     initial = states[0][1]
-    spacing = np.diff(np.unique(initial[:, 0].round(6)))[0]
+    # That of a lattice, or near enough of other particles.
+    spacing = max(
+        np.diff(np.unique(initial[:, 0].round(6)))[0],
+        0.8 * np.cbrt(np.ptp(initial, axis=0).prod() / len(initial)),
+    )
     offset, clouds = 0.0, []
-    for time, start, displacement, pressure in states:
-        right, up, depth = project(start + example.enlarge * displacement, example.azimuth)
-        shift = offset - right.min()
-        offset += right.max() - right.min() + example.gap
+    for time, start, displacement, colour in states:
+        points = start + example.enlarge * displacement
+        if example.z_up:
+            points = points[:, [0, 2, 1]] * (1, 1, -1)
+        right, up, depth = project(points, example.azimuth)
+        if example.stacked:
+            up = up + offset - up.max()
+            offset -= np.ptp(up) + example.gap
+            place, alignment = (right.min(), up.mean()), {"ha": "right", "va": "center"}
+        else:
+            right = right + offset - right.min()
+            offset += np.ptp(right) + example.gap
+            place, alignment = (right.mean(), up.min()), {"ha": "center", "va": "top"}
         order = np.argsort(depth)
         clouds.append(
             axes.scatter(
-                (right + shift)[order], up[order], c=pressure[order] / scale, cmap="coolwarm",
+                right[order], up[order], c=colour[order] / scale, cmap="coolwarm",
                 vmin=-most / scale, vmax=most / scale, linewidths=0.15, edgecolors="#00000055",
             )
         )
-        axes.annotate(
-            f"{time:g} s", ((right + shift).mean(), up.min()), (0, -8),
-            textcoords="offset points", ha="center", va="top", fontsize=8,
-        )
+        axes.annotate(f"{time:g} s", place, (-8, 0) if example.stacked else (0, -8), textcoords="offset points", fontsize=8, **alignment)
     axes.set_aspect("equal")
     axes.axis("off")
     axes.margins(0.03, 0.06)
@@ -179,7 +292,7 @@ def draw_particles(figure, axes, example, folder):
     for cloud in clouds:
         cloud.set_sizes([diameter**2])
     bar = figure.colorbar(clouds[0], ax=axes, shrink=0.75, pad=0.01, aspect=25)
-    bar.set_label(f"pressure [{unit}]")
+    bar.set_label(f"{name} [{unit}]")
     bar.outline.set_visible(False)
     if example.enlarge != 1:
         axes.set_title(f"displacements enlarged {example.enlarge:,.0f} times", fontsize=9)

@@ -47,7 +47,8 @@ pub fn package(scene: &Scene, version: FmiVersion, library: &Path, out: &Path) -
     let binary = read_library(library)?;
     let simulation = Simulation::new(scene.clone())?;
     let table = Table::new(&simulation, version)?;
-    let scene_text = serde_json::to_string_pretty(scene).map_err(|e| {
+    let (packed, resources) = scene.packed()?;
+    let scene_text = serde_json::to_string_pretty(&packed).map_err(|e| {
         Error::new(
             Code::Internal,
             format!("the scene cannot be written as JSON: {e}"),
@@ -68,6 +69,9 @@ pub fn package(scene: &Scene, version: FmiVersion, library: &Path, out: &Path) -
             documentation::page(&simulation, &table)?.into_bytes(),
         ),
     ];
+    for (name, content) in resources {
+        files.push((format!("resources/{name}"), content));
+    }
     for (name, text) in LICENCES {
         files.push((
             format!("documentation/licenses/{name}"),

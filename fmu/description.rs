@@ -29,6 +29,7 @@ const UNITS: &[UnitRow] = &[
     ("kg/m^3", [1, -3, 0, 0], "Density"),
     ("Pa", [1, -1, -2, 0], "Stress"),
     ("N", [1, 1, -2, 0], "Force"),
+    ("N.s", [1, 1, -1, 0], "Impulse"),
     ("N.m", [1, 2, -2, 0], "Moment"),
     ("J", [1, 2, -2, 0], "Energy"),
     ("J/m^3", [1, -1, -2, 0], "EnergyDensity"),

@@ -127,8 +127,8 @@ pub(super) unsafe fn instantiate(arguments: Arguments, refusal: Option<&str>) ->
         let token = token.ok_or_else(|| {
             Error::argument("the token is NULL: pass the one of modelDescription.xml")
         })?;
-        let scene = read_scene(resources.as_deref())?;
-        Instance::new(arguments.version, scene, &token)
+        let (scene, folder) = read_scene(resources.as_deref())?;
+        Instance::new(arguments.version, scene, folder, &token)
     });
     let made = made.unwrap_or_else(|panic| Err(internal(&panic)));
     match made {
@@ -558,20 +558,19 @@ pub(super) unsafe fn optional_text(pointer: *const c_char) -> Option<String> {
 }
 
 /// Reads the scene from the resources, wherever the importer says that they are, or beside the
-/// library if it says nothing useful.
-fn read_scene(resources: Option<&str>) -> Result<String> {
+/// library if it says nothing useful; and the folder that it is in, for the files that it names.
+fn read_scene(resources: Option<&str>) -> Result<(String, PathBuf)> {
     let given = resources.filter(|r| !r.is_empty()).map(resource_path);
-    let places: Vec<PathBuf> = given
-        .into_iter()
-        .chain(own_resources())
-        .map(|folder| folder.join("scene.json"))
-        .collect();
-    for place in &places {
-        if let Ok(text) = std::fs::read_to_string(place) {
-            return Ok(text);
+    let places: Vec<PathBuf> = given.into_iter().chain(own_resources()).collect();
+    for folder in &places {
+        if let Ok(text) = std::fs::read_to_string(folder.join("scene.json")) {
+            return Ok((text, folder.clone()));
         }
     }
-    let tried: Vec<_> = places.iter().map(|p| p.display().to_string()).collect();
+    let tried: Vec<_> = places
+        .iter()
+        .map(|p| p.join("scene.json").display().to_string())
+        .collect();
     Err(Error::new(
         Code::Io,
         format!(

@@ -1,5 +1,7 @@
 //! An instance of the FMU: the state machine around a simulation, the same for both standards.
 
+use std::path::PathBuf;
+
 use super::FmiVersion;
 use super::state::State;
 use super::table::{Kind, Slot, Table};
@@ -48,6 +50,8 @@ pub(super) struct Instance {
     table: Table,
     /// The scene as JSON; parameters are overrides of it.
     scene: String,
+    /// Of the resources, for the files that the scene names.
+    folder: PathBuf,
     simulation: Simulation,
     phase: Phase,
     /// Importer's time at the simulation's time 0 [s].
@@ -71,8 +75,8 @@ impl Instance {
     ///
     /// # Errors
     /// Those of the scene and of setting it up, and a token of another scene or version.
-    pub fn new(version: FmiVersion, scene: String, token: &str) -> Result<Self> {
-        let simulation = Simulation::new(Scene::from_json(&scene, &[])?)?;
+    pub fn new(version: FmiVersion, scene: String, folder: PathBuf, token: &str) -> Result<Self> {
+        let simulation = Simulation::new(Scene::from_json_in(&scene, &[], &folder)?)?;
         let table = Table::new(&simulation, version)?;
         if table.token != token {
             return Err(Error::argument(format!(
@@ -86,6 +90,7 @@ impl Instance {
         let inputs = start_inputs(&table);
         Ok(Self {
             scene,
+            folder,
             simulation,
             phase: Phase::Instantiated,
             start: 0.0,
@@ -490,7 +495,7 @@ impl Instance {
             .filter(|(parameter, value)| **value != parameter.start)
             .filter_map(|(parameter, value)| parameter.scene_override(*value))
             .collect();
-        Scene::from_json(&self.scene, &overrides)
+        Scene::from_json_in(&self.scene, &overrides, &self.folder)
     }
 
     fn build(&self, parameters: &[f64]) -> Result<Simulation> {

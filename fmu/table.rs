@@ -412,7 +412,7 @@ fn token(scene: &Scene, table: &Table) -> Result<String> {
         "{} {:?}\n{}\n",
         crate::VERSION,
         table.version,
-        scene_tree(scene)?
+        scene_tree(&scene.of_content())?
     );
     for v in &table.variables {
         text.push_str(&format!(

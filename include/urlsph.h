@@ -277,8 +277,8 @@ typedef struct urlsph_energies {
     // Energy taken out by the angular-momentum projection since time 0, of either sign.
     double projection;
     // What is stored and dissipated less what was supplied and the initial energy: kinetic + strain +
-    // thermal + plastic work that did not become heat + numerical_dissipation + projection -
-    // external_work - heat_in - initial energy.
+    // thermal + plastic work that did not become heat + numerical_dissipation +
+    // contact_dissipation + projection - external_work - heat_in - initial energy.
     double closure_error;
     // Thermal part of the internal energy, from the reference temperature on.
     double thermal;
@@ -293,6 +293,8 @@ typedef struct urlsph_energies {
     double entropy;
     // Entropy produced by conduction and plastic flow since time 0 [J/K]: never falls.
     double entropy_production;
+    // Kinetic energy lost in inelastic contact since time 0: never falls.
+    double contact_dissipation;
 } urlsph_energies;
 
 // Momenta of the whole body.
@@ -428,13 +430,14 @@ const char *urlsph_status_text(int32_t status);
 
 // Creates a simulation from the JSON text of a scene.
 //
-// - `json`: NUL-terminated UTF-8.
+// - `json`: NUL-terminated UTF-8. Files that the scene names, such as a mesh, are relative to the
+//   working directory.
 // - `options`, `options_size`: NULL and 0 for the defaults, or the options and their size.
 // - `simulation`: receives the handle; NULL on failure. Release it with `urlsph_destroy`.
 // - `error`, `error_size`: NULL and 0, or receives what went wrong: there is no handle to ask.
 //
 // Errors: `URLSPH_INVALID_ARGUMENT`, `URLSPH_PARSE`, `URLSPH_INVALID_SCENE` with the JSON path or
-// the particle, `URLSPH_OUT_OF_MEMORY`. Any thread, at any time.
+// the particle, `URLSPH_IO` for a mesh file, `URLSPH_OUT_OF_MEMORY`. Any thread, at any time.
 urlsph_status urlsph_create_from_json(const char *json,
                                       const struct urlsph_options *options,
                                       size_t options_size,
@@ -444,7 +447,7 @@ urlsph_status urlsph_create_from_json(const char *json,
 
 // Creates a simulation from the file of a scene.
 //
-// - `path`: NUL-terminated UTF-8.
+// - `path`: NUL-terminated UTF-8. Files that the scene names are relative to its folder.
 // - The others: as for `urlsph_create_from_json`.
 //
 // Errors: those of `urlsph_create_from_json`, and `URLSPH_IO`. Any thread, at any time.

@@ -97,8 +97,8 @@ impl Graph {
             let (particle, position) = place(i);
             return Err(Error::scene(
                 "geometry",
-                "the body falls into parts that are not connected: let the boxes share a face, \
-                 or make a scene of each part",
+                "the body falls into parts that are not connected: let boxes share a face and the \
+                 parts of a mesh their nodes, or make a scene of each part",
             )
             .at_particle(particle, position));
         }

@@ -1,7 +1,10 @@
 //! What a scene will cost and which physics it switches on, for `urlsph check`.
 
+use crate::particles::MeshSummary;
+use crate::reference::Repair;
 use crate::scene::{
-    Limiter, Material, Neighbours, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights,
+    Limiter, Material, Neighbours, Operators, Reconstruction, ReferenceUpdate, Scene,
+    StateMeasures, Weights,
 };
 
 /// What a scene will cost.
@@ -13,12 +16,16 @@ pub struct Plan {
     pub pairs: usize,
     /// Smallest, mean and largest number of neighbours.
     pub neighbours: (usize, f64, usize),
+    /// The cells, where the particles are the nodes of a mesh.
+    pub mesh: Option<MeshSummary>,
     /// Stable time step at the start [s].
     pub stable_step: f64,
     /// Estimated number of steps to the scene's end.
     pub steps: u64,
     /// Memory of the simulation [bytes].
     pub memory: usize,
+    /// What the repair of the operators took and left, where they are repaired.
+    pub repair: Option<Repair>,
     /// Physics and options that are on, one line each.
     pub on: Vec<String>,
     /// Physics and options that are off, one line each.
@@ -26,7 +33,7 @@ pub struct Plan {
 }
 
 /// Physics and options that a scene has on and off.
-pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
+pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec<String>) {
     let n = &scene.numerics;
     let mut on = vec![match &scene.material {
         Material::NeoHookean(_) => "neo-Hookean elasticity".to_string(),
@@ -39,9 +46,16 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
         Neighbours::Lattice(count) => format!("{count} lattice neighbours"),
         Neighbours::Radius { radius } => format!("neighbours within {radius} spacings"),
     });
-    on.push(match n.weights {
-        Weights::Unit => "unit kernel weights".to_string(),
-        Weights::Tributary => "tributary kernel weights".to_string(),
+    on.push(match (operators, n.weights) {
+        (Operators::Kernel, Weights::Unit) => "operators of the kernel, unit weights".to_string(),
+        (Operators::Kernel, Weights::Tributary) => {
+            "operators of the kernel, tributary weights".to_string()
+        }
+        (Operators::Repaired, _) if n.redoes_the_repair() => {
+            "operators of the kernel, repaired at every update".to_string()
+        }
+        (Operators::Repaired, _) => "operators of the kernel, repaired".to_string(),
+        (Operators::Mesh, _) => "operators of the mesh".to_string(),
     });
     let mut off = Vec::new();
     let mut feature = |is_on: bool, name: String| {
@@ -50,12 +64,17 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
     let dissipation = match (n.reconstruction, n.limiter) {
         (Reconstruction::None, _) => "Riemann dissipation D^p, first order",
         (_, Limiter::None) => "Riemann dissipation D^p, linear reconstruction",
+        (_, Limiter::Shock) => "Riemann dissipation D^p, linear reconstruction, shock limiter",
         (_, Limiter::Minmod) => "Riemann dissipation D^p, linear reconstruction, minmod limiter",
         (_, Limiter::Venkatakrishnan) => {
             "Riemann dissipation D^p, linear reconstruction, Venkatakrishnan limiter"
         }
     };
-    feature(n.dissipation, dissipation.to_string());
+    let dissipation = match n.dissipation_coefficient {
+        1.0 => dissipation.to_string(),
+        coefficient => format!("{dissipation} (coefficient {coefficient})"),
+    };
+    feature(n.dissipation, dissipation);
     feature(
         n.state != StateMeasures::F,
         match n.state {
@@ -82,6 +101,10 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
     feature(
         n.angular_momentum_projection,
         "angular-momentum projection".to_string(),
+    );
+    feature(
+        !scene.contact.is_empty(),
+        "contact with rigid planes".to_string(),
     );
     feature(scene.body_force.is_some(), "body force".to_string());
     let plastic = matches!(

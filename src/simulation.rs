@@ -1,21 +1,25 @@
 //! A running simulation: the time step is written here, once.
 
-use crate::boundary::{Boundary, Input, InputValues, Patch, Quantity};
+use crate::boundary::{Approach, Boundary, Input, InputValues, Patch, Quantity, WallState};
 use crate::error::{Code, Error, Result};
 use crate::fields::Field;
 use crate::formulation::angular_momentum;
 use crate::formulation::url::{Breakdown, Evaluation, State, Trouble, Url};
 use crate::integrator::{ANGULAR_ARMS, SSP_RK3};
 use crate::layout::{Array, Layout};
-use crate::ledger::{Accounts, Energies, HeatResultant, Momenta, Resultant};
+use crate::ledger::{
+    Accounts, ContactResultant, Energies, HeatResultant, Momenta, Resultant, Resultants,
+};
 use crate::material::Law;
 use crate::math::*;
 use crate::neighbours::Graph;
 use crate::parallel::{self, Pool};
-use crate::particles::Particles;
+use crate::particles::{MeshSummary, Particles};
 use crate::plan::Plan;
 use crate::reference::{Reference, Updated};
-use crate::scene::{Numerics, ReferenceUpdate, ScalarFunction, Scene};
+use crate::scene::{
+    InitialGradient, Numerics, ReferenceUpdate, ScalarFunction, Scene, VectorFunction,
+};
 use crate::snapshot::Snapshot;
 
 /// A body in motion. Created from a [`Scene`], advanced in time, read by fields and resultants.
@@ -30,6 +34,7 @@ pub struct Simulation {
     pool: Pool,
     boundary: Boundary,
     probes: Probes,
+    mesh: Option<MeshSummary>,
     /// Body's particle to caller's, and back.
     order: Vec<u32>,
     rank: Vec<u32>,
@@ -40,14 +45,14 @@ pub struct Simulation {
     reference: Reference,
     inputs: InputValues,
     accounts: Accounts,
+    walls: Vec<WallState>,
     // Scratch: recomputed from the state.
     url: Url,
     start: State,
     velocity_before: Option<Array<3>>,
+    approach: Approach,
     evaluation: Evaluation,
-    resultants: Vec<Resultant>,
-    /// Empty of a body without heat.
-    heat_resultants: Vec<HeatResultant>,
+    resultants: Resultants,
     generation: u64,
     /// Stable step at time 0 [s].
     first_step: f64,
@@ -148,6 +153,7 @@ impl Simulation {
         })?;
         let mut this = Self {
             scene_hash: crate::snapshot::scene_hash(&scene),
+            mesh: particles.mesh_summary(&scene),
             pool,
             probes,
             order: particles.order,
@@ -155,6 +161,8 @@ impl Simulation {
             time: 0.0,
             steps: 0,
             inputs: boundary.start_values(),
+            walls: boundary.walls_at_rest(),
+            approach: Approach::default(),
             boundary,
             accounts: Accounts::default(),
             start: state.clone(),
@@ -165,20 +173,18 @@ impl Simulation {
             reference,
             url,
             evaluation: Evaluation::default(),
-            resultants: Vec::new(),
-            heat_resultants: Vec::new(),
+            resultants: Resultants::default(),
             generation: 0,
             first_step: 0.0,
             scene,
         };
-        this.boundary
-            .constrain(&mut this.state.v, 0.0, &this.inputs)?;
+        let supplied = this.first_impulse()?;
         hold_temperatures(
             &this.boundary,
             &this.url,
             &mut this.state,
             &this.reference,
-            0.0,
+            (0.0, |_, (_, heat)| heat),
             &this.inputs,
         )?;
         this.evaluate().map_err(|e| {
@@ -192,11 +198,32 @@ impl Simulation {
         })?;
         this.first_step = this.stable_step();
         let e = &this.evaluation;
-        this.accounts.initial = e.kinetic + e.strain + e.thermal;
-        (this.resultants, this.heat_resultants) = this.compute_resultants()?;
+        this.accounts.initial = e.kinetic + e.strain + e.thermal - supplied;
+        this.resultants = this.compute_resultants()?;
         // A load that has no finite value at the start is an error of the scene, not of its first step.
         this.nodal_forces()?;
         Ok(this)
+    }
+
+    /// Supports and planes take hold of the initial velocity; the energy that they supply.
+    fn first_impulse(&mut self) -> Result<f64> {
+        let Self {
+            pool,
+            boundary,
+            state,
+            reference,
+            inputs,
+            walls,
+            accounts,
+            ..
+        } = self;
+        let held = boundary.constrained_kinetic(&state.v);
+        boundary.constrain(&mut state.v, 0.0, inputs)?;
+        let supports = boundary.constrained_kinetic(&state.v) - held;
+        let contact = pool.install(|| boundary.first_contact(state, walls, reference))?;
+        accounts.external_work += supports;
+        accounts.exchange(contact);
+        Ok(supports + contact.work - contact.dissipation)
     }
 
     fn nodal_forces(&self) -> Result<Array<3>> {
@@ -204,7 +231,7 @@ impl Simulation {
         let (url, state) = (&self.url, &self.state);
         self.pool.install(|| {
             self.boundary
-                .nodal_forces(url, state, &self.reference, now, &self.inputs)
+                .nodal_forces(url, state, &self.reference, now, &self.inputs, &self.walls)
         })
     }
 
@@ -222,7 +249,7 @@ impl Simulation {
     pub fn plan(&self) -> Plan {
         let (fewest, most) = self.reference.neighbour_range;
         let dt = self.stable_step();
-        let (on, off) = crate::plan::features(&self.scene);
+        let (on, off) = crate::plan::features(&self.scene, self.reference.operators);
         Plan {
             particles: self.particle_count(),
             pairs: self.pair_count(),
@@ -231,9 +258,11 @@ impl Simulation {
                 self.pair_count() as f64 / self.particle_count() as f64,
                 most,
             ),
+            mesh: self.mesh.clone(),
             stable_step: dt,
             steps: (self.scene.time.end / dt).ceil() as u64,
             memory: self.memory(),
+            repair: self.reference.repair().copied(),
             on,
             off,
         }
@@ -332,7 +361,7 @@ impl Simulation {
         }
         let resultants = self.compute_resultants();
         outcome?;
-        (self.resultants, self.heat_resultants) = resultants?;
+        self.resultants = resultants?;
         Ok(())
     }
 
@@ -382,7 +411,7 @@ impl Simulation {
     /// THE time step: three stages of rates, loads, blend, supports.
     fn step(&mut self, dt: f64, end: f64) -> Result<()> {
         self.start.copy_from(&self.state);
-        let accounts = self.accounts;
+        let (accounts, walls) = (self.accounts, self.walls.clone());
         match self.stages(dt, end) {
             Ok(()) => {
                 self.time = end;
@@ -393,6 +422,7 @@ impl Simulation {
             Err(error) => {
                 self.state.copy_from(&self.start);
                 self.accounts = accounts;
+                self.walls = walls;
                 self.evaluate()?;
                 Err(error)
             }
@@ -407,6 +437,8 @@ impl Simulation {
             reference,
             inputs,
             accounts,
+            walls,
+            approach,
             url,
             start,
             ..
@@ -419,6 +451,8 @@ impl Simulation {
             let diverged = |b: Breakdown, state: &State| diverged(b, state, order, end);
             let mut before = before;
             let held = boundary.constrained_kinetic(&state.v);
+            let wave_speed = url.wave_speeds().pressure;
+            boundary.approach(approach, state, walls, reference, wave_speed, (time, dt))?;
             for (i, stage) in SSP_RK3.into_iter().enumerate() {
                 let stage_time = time + stage.time * dt;
                 let share = stage.weight * dt;
@@ -456,15 +490,21 @@ impl Simulation {
                     url.rates.heat = Some(heat);
                     accounts.heat_in += share * url.heat_power(power?);
                 }
+                boundary.follow(approach, i, &url.rates.force, &state.v, dt);
                 url.advance_stage(state, start, reference, (stage.keep, stage.take), dt);
                 let next = SSP_RK3.get(i + 1).map_or(end, |next| time + next.time * dt);
                 boundary.constrain(&mut state.v, next, inputs)?;
+                boundary.keep_out(approach, i, &mut state.v, walls, next)?;
                 let last = i + 1 == SSP_RK3.len();
                 if last {
                     accounts.plastic += url.commit(state, reference, dt);
                 }
+                // The entropy that a support adds makes up for that of the stage's rates: its heat is
+                // that at their temperature, so that the ledger is of the integrator's order.
+                let supplied = |slot, (entropy, _)| url.evaluated_temperature(slot) * entropy;
+                let now = (next, supplied);
                 accounts.heat_in +=
-                    stage.carry * hold_temperatures(boundary, url, state, reference, next, inputs)?;
+                    stage.carry * hold_temperatures(boundary, url, state, reference, now, inputs)?;
                 if last && is_stale(numerics, steps) {
                     url.update_reference(state, reference)
                         .map_err(|b| diverged(b, state))?;
@@ -476,6 +516,7 @@ impl Simulation {
             }
             // What the supports did: they held the constrained components against all forces.
             accounts.external_work += boundary.constrained_kinetic(&state.v) - held;
+            accounts.exchange(boundary.settle(approach, &state.v, walls));
             Ok(())
         })
     }
@@ -518,7 +559,7 @@ impl Simulation {
                     &self.url,
                     state,
                     &self.reference,
-                    self.time,
+                    (self.time, |_, (_, heat)| heat),
                     inputs,
                 )
             });
@@ -537,25 +578,29 @@ impl Simulation {
         Ok(Some(old))
     }
 
-    fn compute_resultants(&self) -> Result<(Vec<Resultant>, Vec<HeatResultant>)> {
+    fn compute_resultants(&self) -> Result<Resultants> {
         let now = (self.time, self.stable_step());
         let (url, state, reference) = (&self.url, &self.state, &self.reference);
         self.pool.install(|| {
-            let resultants = self
-                .boundary
-                .resultants(url, state, reference, now, &self.inputs)?;
-            let Some(heat) = &url.rates.heat else {
-                return Ok((resultants, Vec::new()));
+            let (boundary, inputs) = (&self.boundary, &self.inputs);
+            let (patches, contacts) =
+                boundary.resultants(url, state, reference, now, inputs, &self.walls)?;
+            let heat = match &url.rates.heat {
+                None => Vec::new(),
+                Some(heat) => boundary.heat_resultants(
+                    heat,
+                    reference,
+                    |slot| url.evaluated_temperature(slot),
+                    |slot, rate| url.heat_uptake(state, reference, slot, rate),
+                    now,
+                    inputs,
+                )?,
             };
-            let heat = self.boundary.heat_resultants(
+            Ok(Resultants {
+                patches,
                 heat,
-                reference,
-                |slot| url.evaluated_temperature(slot),
-                |slot, rate| url.heat_uptake(state, reference, slot, rate),
-                now,
-                &self.inputs,
-            )?;
-            Ok((resultants, heat))
+                contacts,
+            })
         })
     }
 
@@ -564,7 +609,7 @@ impl Simulation {
     /// # Panics
     /// If `patch` is not an index into [`patches`](Self::patches) of a body with heat.
     pub fn heat_resultant(&self, patch: usize) -> Option<HeatResultant> {
-        (!self.heat_resultants.is_empty()).then(|| self.heat_resultants[patch])
+        (!self.resultants.heat.is_empty()).then(|| self.resultants.heat[patch])
     }
 
     /// Energies now.
@@ -616,7 +661,20 @@ impl Simulation {
     /// # Panics
     /// If `patch` is not an index into [`patches`](Self::patches).
     pub fn resultant(&self, patch: usize) -> Resultant {
-        self.resultants[patch]
+        self.resultants.patches[patch]
+    }
+
+    /// Names of the scene's planes of contact, in the order of [`contact`](Self::contact).
+    pub fn contact_names(&self) -> impl Iterator<Item = &str> {
+        self.boundary.wall_names()
+    }
+
+    /// What a plane of contact does now, and has done since time 0.
+    ///
+    /// # Panics
+    /// If `wall` is not an index into [`contact_names`](Self::contact_names).
+    pub fn contact(&self, wall: usize) -> ContactResultant {
+        self.resultants.contacts[wall]
     }
 
     /// Names of the scene's probes, in the order of [`probe`](Self::probe).
@@ -678,7 +736,7 @@ impl Simulation {
             self.inputs[index] = values;
         }
         match self.compute_resultants() {
-            Ok(resultants) => (self.resultants, self.heat_resultants) = resultants,
+            Ok(resultants) => self.resultants = resultants,
             Err(error) => {
                 self.inputs = old;
                 return Err(error);
@@ -818,6 +876,7 @@ impl Simulation {
             steps: self.steps,
             accounts: self.accounts,
             inputs: self.inputs.clone(),
+            walls: self.walls.clone(),
             state: self.state.clone(),
             updated: self.reference.updated.clone(),
         }
@@ -842,6 +901,7 @@ impl Simulation {
             && snapshot.state.history.is_some() == self.state.history.is_some()
             && shape(&snapshot.updated) == shape(&self.reference.updated)
             && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.walls.len() == self.walls.len()
             && snapshot.time.is_finite();
         if !same_shape {
             return Err(Error::new(
@@ -856,7 +916,7 @@ impl Simulation {
         let restored = self.put(snapshot).and_then(|()| self.compute_resultants());
         match restored {
             Ok(resultants) => {
-                (self.resultants, self.heat_resultants) = resultants;
+                self.resultants = resultants;
                 Ok(())
             }
             Err(error) => {
@@ -871,6 +931,7 @@ impl Simulation {
         self.steps = snapshot.steps;
         self.accounts = snapshot.accounts;
         self.inputs.clone_from(&snapshot.inputs);
+        self.walls.clone_from(&snapshot.walls);
         self.state.copy_from(&snapshot.state);
         if snapshot.updated.is_some() && snapshot.updated != self.reference.updated {
             self.reference.updated.clone_from(&snapshot.updated);
@@ -903,7 +964,23 @@ impl Probes {
         };
         for (name, point) in &scene.probes {
             let weights = particles.interpolation(*point).ok_or_else(|| {
-                Error::scene(format!("probes.{name}"), "the point lies outside the body")
+                let distance = |x: &[f64; 3]| {
+                    let r = sub3(*x, *point);
+                    dot(r, r)
+                };
+                let nearest = particles
+                    .positions
+                    .iter()
+                    .enumerate()
+                    .min_by(|(_, x), (_, y)| distance(x).total_cmp(&distance(y)));
+                let error = Error::scene(
+                    format!("probes.{name}"),
+                    "the point lies outside the body; the nearest particle is named here",
+                );
+                match nearest {
+                    Some((i, x)) => error.at_particle(particles.caller(i), Some(*x)),
+                    None => error,
+                }
             })?;
             this.names.push(name.clone());
             this.weights.push(weights);
@@ -912,8 +989,28 @@ impl Probes {
     }
 }
 
-/// Displacement and velocity at time 0; f follows from the positions by the discrete gradient, so
-/// that it is consistent with the operators.
+/// Over the body's size, the half-width of the central differences of expressions: their error is
+/// near its square, round-off near 1e-16 over it.
+const DIFFERENCE: f64 = 1e-5;
+
+/// Gradient of a field of the scene at time 0.
+fn gradient(field: &VectorFunction, x: [f64; 3], half: f64) -> Mat3<f64> {
+    let mut gradient = [[0.0; 3]; 3];
+    for c in 0..3 {
+        let at = |offset: f64| {
+            let mut y = x;
+            y[c] += offset;
+            field.eval(y, 0.0)
+        };
+        let jump = sub3(at(half), at(-half));
+        for r in 0..3 {
+            gradient[r][c] = jump[r] / (2.0 * half);
+        }
+    }
+    gradient
+}
+
+/// Displacement, deformation, velocity and entropy at time 0.
 pub(crate) fn initial_state(
     scene: &Scene,
     url: &Url,
@@ -948,7 +1045,20 @@ pub(crate) fn initial_state(
             let u = finite(displacement.eval(*x, 0.0), "initial.displacement", i)?;
             state.x.set(Layout::slot(i), add3(*x, u));
         }
-        crate::formulation::url::deform(&mut state, reference);
+        match scene.initial.gradient {
+            InitialGradient::Discrete => crate::formulation::url::deform(&mut state, reference),
+            InitialGradient::Exact => {
+                let points = particles.positions.iter();
+                let extent = points.flatten().fold(0.0, |l: f64, x| l.max(x.abs()));
+                for (i, x) in particles.positions.iter().enumerate() {
+                    let gradient = gradient(&displacement, *x, DIFFERENCE * extent);
+                    for row in gradient {
+                        finite(row, "initial.displacement", i)?;
+                    }
+                    state.deform(Layout::slot(i), add9(&IDENTITY, &gradient));
+                }
+            }
+        }
     }
     if let Some(heat) = &scene.heat {
         let function = match &scene.initial.temperature {
@@ -977,20 +1087,21 @@ fn is_stale(numerics: &Numerics, steps: u64) -> bool {
     }
 }
 
-/// Gives the particles with a prescribed temperature theirs; the heat that this takes [J].
+/// Gives the particles with a prescribed temperature theirs at time `t`; the heat that this takes [J],
+/// by `supplied(slot, (entropy, heat))` of a particle's entropy and heat.
 fn hold_temperatures(
     boundary: &Boundary,
     url: &Url,
     state: &mut State,
     reference: &Reference,
-    t: f64,
+    (t, supplied): (f64, impl Fn(usize, (f64, f64)) -> f64),
     inputs: &InputValues,
 ) -> Result<f64> {
-    let mut supplied = 0.0;
+    let mut total = 0.0;
     boundary.hold_temperatures(t, inputs, |slot, theta| {
-        supplied += url.set_temperature(state, reference, slot, theta);
+        total += supplied(slot, url.set_temperature(state, reference, slot, theta));
     })?;
-    Ok(supplied)
+    Ok(total)
 }
 
 fn diverged(b: Breakdown, state: &State, order: &[u32], time: f64) -> Error {

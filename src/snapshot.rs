@@ -1,12 +1,14 @@
 //! Snapshots: the complete state in memory, and as bytes with a version and a checksum.
 
-use xxhash_rust::xxh3::{Xxh3, xxh3_64, xxh3_64_with_seed};
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
-use crate::boundary::InputValues;
+use crate::boundary::{InputValues, WallState};
 use crate::error::{Code, Error, Result};
 use crate::formulation::url::State;
 use crate::layout::{Array, Layout};
 use crate::ledger::Accounts;
+use crate::material::VIRGIN;
+use crate::math::{IDENTITY, flat};
 use crate::reference::Updated;
 use crate::scene::Scene;
 
@@ -18,6 +20,7 @@ pub struct Snapshot {
     pub(crate) steps: u64,
     pub(crate) accounts: Accounts,
     pub(crate) inputs: InputValues,
+    pub(crate) walls: Vec<WallState>,
     pub(crate) state: State,
     pub(crate) updated: Option<Updated>,
 }
@@ -29,19 +32,13 @@ const FORMAT: u32 = 2;
 /// Hash of everything that determines the meaning of a state: not of what a run writes, nor of how
 /// long it lasts.
 pub(crate) fn scene_hash(scene: &Scene) -> u64 {
-    let mut scene = scene.clone();
+    let mut scene = scene.of_content();
     scene.title.clear();
     scene.probes.clear();
     scene.output = crate::scene::Output::default();
     scene.time.end = 0.0;
-    // The content of a mesh counts, not the place of its file.
-    let mut content = 0;
-    if let crate::scene::Geometry::Mesh(mesh) = &mut scene.geometry {
-        mesh.file.clear();
-        content = mesh.content_hash();
-    }
     let text = serde_json::to_string(&scene).expect("a scene is plain data");
-    xxh3_64_with_seed(text.as_bytes(), content)
+    xxh3_64(text.as_bytes())
 }
 
 /// Takes the parts of a snapshot in a fixed order: the writer, the hasher and the reader walk the same path.
@@ -67,22 +64,17 @@ trait Walk {
     fn optional<const N: usize>(
         &mut self,
         array: &mut Option<Array<N>>,
-        layout: Layout,
+        (layout, dummy): (Layout, [f64; N]),
     ) -> Result<()> {
         let mut present = u64::from(array.is_some());
         self.word(&mut present)?;
         match present {
             0 => *array = None,
-            1 => self.array(array.get_or_insert_with(|| Array::new(layout, identity())))?,
+            1 => self.array(array.get_or_insert_with(|| Array::new(layout, dummy)))?,
             _ => return Err(damaged("an unknown flag")),
         }
         Ok(())
     }
-}
-
-/// Dummies of a field that is read back: f, h and j are the identity there, all others irrelevant.
-fn identity<const N: usize>() -> [f64; N] {
-    std::array::from_fn(|c| if N == 9 && c % 4 != 0 { 0.0 } else { 1.0 })
 }
 
 impl Snapshot {
@@ -100,6 +92,7 @@ impl Snapshot {
             &mut a.conduction,
             &mut a.external_work,
             &mut a.dissipation,
+            &mut a.contact,
             &mut a.projection,
         ] {
             walk.number(value)?;
@@ -111,27 +104,36 @@ impl Snapshot {
             values.resize(length, 0.0);
             walk.numbers(values)?;
         }
+        let walls = walk.length(self.walls.len())?;
+        self.walls.resize_with(walls, WallState::default);
+        for wall in &mut self.walls {
+            walk.number(&mut wall.displacement)?;
+            walk.number(&mut wall.impulse)?;
+        }
         let layout = self.state.x.layout();
         walk.array(&mut self.state.x)?;
         walk.array(&mut self.state.v)?;
         walk.array(&mut self.state.f)?;
-        walk.optional(&mut self.state.h, layout)?;
-        walk.optional(&mut self.state.j, layout)?;
-        walk.optional(&mut self.state.eta, layout)?;
-        walk.optional(&mut self.state.history, layout)?;
+        // Dummies are undeformed, at zero entropy and virgin: what the passes make of them must be finite.
+        walk.optional(&mut self.state.h, (layout, flat(&IDENTITY)))?;
+        walk.optional(&mut self.state.j, (layout, [1.0]))?;
+        walk.optional(&mut self.state.eta, (layout, [0.0]))?;
+        walk.optional(&mut self.state.history, (layout, VIRGIN))?;
         let mut updated = u64::from(self.updated.is_some());
         walk.word(&mut updated)?;
         if updated == 1 {
             let u = self.updated.get_or_insert_with(|| Updated {
                 chi: Array::new(layout, [0.0; 3]),
-                f_chi: Array::new(layout, identity()),
+                f_chi: Array::new(layout, flat(&IDENTITY)),
                 j_chi: Array::new(layout, [1.0]),
                 h_chi: None,
+                half_mu: None,
             });
             walk.array(&mut u.chi)?;
             walk.array(&mut u.f_chi)?;
             walk.array(&mut u.j_chi)?;
-            walk.optional(&mut u.h_chi, layout)?;
+            walk.optional(&mut u.h_chi, (layout, flat(&IDENTITY)))?;
+            walk.optional(&mut u.half_mu, (layout, [0.0; 3]))?;
         }
         Ok(())
     }
@@ -189,10 +191,11 @@ impl Snapshot {
             steps: 0,
             accounts: Accounts::default(),
             inputs: Vec::new(),
+            walls: Vec::new(),
             state: State {
                 x: Array::new(layout, [0.0; 3]),
                 v: Array::new(layout, [0.0; 3]),
-                f: Array::new(layout, identity()),
+                f: Array::new(layout, flat(&IDENTITY)),
                 h: None,
                 j: None,
                 eta: None,

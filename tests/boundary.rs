@@ -349,3 +349,215 @@ fn divergence_names_the_place_and_keeps_the_last_good_state() {
     }
     assert_eq!(s.time(), time);
 }
+
+/// A block in which heat spreads within a second.
+fn warm(overrides: &[&str]) -> Simulation {
+    let heat = r#"heat={"specific_heat": 0.1, "reference_temperature": 300, "conductivity": 200}"#;
+    block(&[&[heat], overrides].concat())
+}
+
+fn heat_flow(s: &Simulation, patch: &str) -> urlsph::HeatResultant {
+    s.heat_resultant(s.patch_index(patch).expect("there"))
+        .expect("a body with heat")
+}
+
+/// |a / b - 1|, printed beside its tolerance.
+fn close(what: &str, a: f64, b: f64, tolerance: f64) {
+    let d = (a / b - 1.0).abs();
+    println!("{what}: {a} of {b}: {d:e} (tolerance {tolerance:e})");
+    assert!(d <= tolerance, "{what}");
+}
+
+#[test]
+fn a_heat_flux_is_heat_per_initial_area() {
+    let mut s = warm(&[r#"boundary.y_max.heat_flux="1e4*(1+X)""#]);
+    close("flow", heat_flow(&s, "y_max").heat_flow, 1.5e4, 1e-12);
+    s.advance(0.5).expect("it runs");
+    let e = s.energies();
+    close("heat", e.heat_in, 0.5 * 1.5e4, 1e-10);
+    // Without a coupling to the motion all of it is thermal energy, in a volume of 2 m^3.
+    // The steps integrate entropy, so that the energy follows to their accuracy.
+    close("thermal energy", e.thermal, e.heat_in, 1e-4);
+    let (hot, cold) = (heat_flow(&s, "y_max"), heat_flow(&s, "y_min"));
+    assert!(hot.maximum_temperature > hot.mean_temperature);
+    assert!(hot.mean_temperature > cold.mean_temperature && cold.heat_flow == 0.0);
+}
+
+/// Between two temperatures the steady flow is k A (theta_1 - theta_0) / L; what one side supplies
+/// the other takes.
+#[test]
+fn prescribed_temperatures_draw_their_heat() {
+    let mut s = warm(&[
+        "boundary.y_min.temperature=300",
+        r#"boundary.y_max.temperature={"table": {"time": [0, 0.2], "value": [300, 400]}}"#,
+    ]);
+    s.advance(0.1).expect("it runs");
+    let hot = heat_flow(&s, "y_max");
+    close("while it rises", hot.mean_temperature, 350.0, 1e-12);
+    s.advance(4.0).expect("it runs");
+    let (hot, cold) = (heat_flow(&s, "y_max"), heat_flow(&s, "y_min"));
+    close("flow in", hot.heat_flow, 1e4, 1e-3);
+    close("flow out", cold.heat_flow, -1e4, 1e-3);
+    let e = s.energies();
+    // The conduction is linear in 1/theta: its profile bends a little between nine nodes.
+    close("thermal energy", e.thermal, 1e4, 6e-3);
+    // 1e4 W pass through for 4 s.
+    let error = e.closure_error / 4e4;
+    println!("closure {error:e} (tolerance 1e-5)");
+    assert!(error.abs() < 1e-5);
+}
+
+/// With convection on one side and a flux on the other the wall settles where they balance.
+#[test]
+fn convection_balances_a_flux() {
+    let mut s = warm(&[
+        r#"boundary.y_min.convection={"coefficient": 250, "ambient_temperature": {"external": 300}}"#,
+        "boundary.y_max.heat_flux=1e4",
+    ]);
+    let ambient = s.patch_index("y_min").expect("there");
+    s.set_input(ambient, Quantity::AmbientTemperature, &[310.0])
+        .expect("declared");
+    close(
+        "at once",
+        heat_flow(&s, "y_min").heat_flow,
+        250.0 * 10.0,
+        1e-12,
+    );
+    s.advance(20.0).expect("it runs");
+    let (hot, cold) = (heat_flow(&s, "y_max"), heat_flow(&s, "y_min"));
+    close("flow out", cold.heat_flow, -1e4, 1e-3);
+    close("wall", cold.mean_temperature, 310.0 + 1e4 / 250.0, 1e-4);
+    close("far side", hot.mean_temperature, 450.0, 2e-3);
+
+    let hash = s.state_hash();
+    for (quantity, value, text) in [
+        (Quantity::AmbientTemperature, 0.0, "above 0 K"),
+        (Quantity::AmbientTemperature, f64::NAN, "only finite values"),
+        (
+            Quantity::ConvectionCoefficient,
+            1.0,
+            r#""convection": {"coefficient": {"external": 0}, ...}"#,
+        ),
+        (
+            Quantity::Temperature,
+            300.0,
+            r#""temperature": {"external": 293.15}"#,
+        ),
+        (Quantity::HeatFlux, 1.0, r#""heat_flux": {"external": 0}"#),
+    ] {
+        let e = s
+            .set_input(ambient, quantity, &[value])
+            .expect_err("refused");
+        println!("{e}");
+        assert!(e.to_string().contains(text), "{e}");
+        assert_eq!(e.place().field.as_deref(), Some(quantity.name()));
+        assert_eq!(e.place().boundary.as_deref(), Some("y_min"));
+    }
+    assert_eq!(s.state_hash(), hash);
+}
+
+/// Values from outside, for the patch and for each of its particles.
+#[test]
+fn outside_heat_per_particle() {
+    let external = r#"boundary.y_max.heat_flux={"external": 0, "per_particle": true}"#;
+    let held = r#"boundary.y_min.temperature={"external": 300}"#;
+    let (mut one, mut many) = (warm(&[external, held]), warm(&[external, held]));
+    let patch = |s: &Simulation, name| s.patch_index(name).expect("there");
+    let (top, bottom) = (patch(&one, "y_max"), patch(&one, "y_min"));
+    let count = |i: usize| one.patches()[i].particles.len();
+    let (all, base) = (vec![2e4; count(top)], vec![320.0; count(bottom)]);
+    one.set_input(top, Quantity::HeatFlux, &[2e4]).expect("one");
+    many.set_input(top, Quantity::HeatFlux, &all).expect("many");
+    one.set_input(bottom, Quantity::Temperature, &[320.0])
+        .expect("one");
+    many.set_input(bottom, Quantity::Temperature, &base)
+        .expect("many");
+    for s in [&mut one, &mut many] {
+        s.advance(0.05).expect("it runs");
+    }
+    assert_ne!(one.state_hash(), many.state_hash(), "inputs of two lengths");
+    assert_eq!(one.energies(), many.energies());
+    close(
+        "base",
+        heat_flow(&one, "y_min").mean_temperature,
+        320.0,
+        1e-12,
+    );
+}
+
+#[test]
+fn heat_conditions_that_make_no_sense_are_refused() {
+    let cases: &[(&[&str], &str, &str)] = &[
+        (
+            &[
+                "boundary.y_max.temperature=300",
+                "boundary.y_max.heat_flux=1",
+            ],
+            "boundary.y_max.heat_flux",
+            "either a prescribed `temperature` or a `heat_flux`",
+        ),
+        (
+            &["boundary.y_max.temperature=0"],
+            "boundary.y_max.temperature",
+            "above 0 K",
+        ),
+        (
+            &[r#"boundary.y_max.temperature={"table": {"time": [0, 1], "value": [300, -1]}}"#],
+            "boundary.y_max.temperature.table.value[1]",
+            "above 0 K",
+        ),
+        (
+            &[r#"boundary.y_max.convection={"coefficient": -1, "ambient_temperature": 300}"#],
+            "boundary.y_max.convection.coefficient",
+            "not negative",
+        ),
+        (
+            &[
+                r#"boundary.y_max.convection={"coefficient": 1, "ambient_temperature": "300-400*X"}"#,
+            ],
+            "boundary.y_max.convection.ambient_temperature",
+            "above 0 K",
+        ),
+        (
+            &[
+                "boundary.y_max.temperature=300",
+                "boundary.x_max.temperature=301",
+            ],
+            "boundary.y_max.temperature",
+            "lies on the patches `x_max` and `y_max`",
+        ),
+        (
+            &["heat=null", "boundary.y_max.heat_flux=1"],
+            "boundary.y_max.heat_flux",
+            "needs the section `heat`",
+        ),
+    ];
+    let heat = r#"heat={"specific_heat": 0.1, "reference_temperature": 300}"#;
+    for (overrides, path, text) in cases {
+        let list: Vec<String> = std::iter::once(heat)
+            .chain(overrides.iter().copied())
+            .map(str::to_string)
+            .collect();
+        let error = Scene::from_json(BLOCK, &list)
+            .and_then(|scene| Simulation::with_threads(scene, 1))
+            .err()
+            .unwrap_or_else(|| panic!("{overrides:?} was taken"));
+        println!("{error}");
+        assert!(error.to_string().contains(text), "{error}");
+        let place = error.place().path.as_deref().unwrap_or("");
+        assert!(place.starts_with(path), "{place} instead of {path}");
+    }
+    // The same temperature on both sides of an edge is no contradiction.
+    warm(&[
+        "boundary.y_max.temperature=310",
+        "boundary.x_max.temperature=310",
+    ]);
+    // An expression may fail later: the error names boundary, quantity, particle and time.
+    let mut s = warm(&[r#"boundary.y_max.temperature="300-4000*t""#]);
+    let e = s.advance(0.2).expect_err("it gets too cold");
+    println!("{e}");
+    let p = e.place();
+    assert!(e.to_string().contains("above 0 K") && p.particle.is_some() && p.time.is_some());
+    assert_eq!(p.boundary.as_deref(), Some("y_max"));
+    assert_eq!(p.field.as_deref(), Some("temperature"));
+}

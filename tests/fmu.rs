@@ -361,3 +361,24 @@ fn the_packager_names_what_is_wrong() {
         .collect();
     assert_eq!(left, ["wrong.so"]);
 }
+
+#[test]
+fn an_fmu_carries_its_mesh() {
+    let folder = TempDir::new().unwrap();
+    let mesh = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/meshes/cube_hexahedra.msh");
+    std::fs::copy(mesh, folder.path().join("cube.msh")).unwrap();
+    let text = SCENE
+        .replace(
+            r#"{"box": {"min": [0, 0, 0], "max": [1, 3, 1], "spacing": 0.5}}"#,
+            r#"{"mesh": {"file": "cube.msh", "scale": 2}}"#,
+        )
+        .replace(r#""per_particle": true"#, r#""per_particle": false"#)
+        .replace("[0.5, 3, 0.5]", "[0.5, 2, 0.5]");
+    let scene = Scene::from_json_in(&text, &[], folder.path()).unwrap();
+    let path = folder.path().join("cube.fmu");
+    fmu::package(&scene, FmiVersion::V3, &fmu::find_library().unwrap(), &path).unwrap();
+    // What the scene was made from is not needed any more.
+    std::fs::remove_file(folder.path().join("cube.msh")).unwrap();
+    let three = Three::new(&path);
+    assert_eq!(three.step(0.0, 1e-4), fmi3Status::Ok);
+}

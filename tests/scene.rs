@@ -10,7 +10,7 @@ use urlsph::scene::{
 };
 use urlsph::{Code, Error};
 
-const EXAMPLES: [&str; 10] = [
+const EXAMPLES: [&str; 11] = [
     "column_tension",
     "column_bending",
     "column_twisting",
@@ -21,6 +21,7 @@ const EXAMPLES: [&str; 10] = [
     "slab_heating",
     "homogeneous",
     "l_block_thermal",
+    "punch",
 ];
 
 fn example_path(name: &str) -> PathBuf {
@@ -386,15 +387,46 @@ fn everything() -> Value {
             "gruneisen_exponent": 0.5, "plastic_heat_fraction": 0.9, "source": "1e3*sin(t)"
         },
         "body_force": [0, "-9.81*1100", 0],
-        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "temperature": "300 - X"},
+        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "gradient": "exact", "temperature": "300 - X"},
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
-            "dissipation": true, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
+            "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
         "output": {"history_interval": 0.01, "field_interval": 0.1, "fields": ["velocity", "cauchy_stress"]}
+    })
+}
+
+/// A geometry of every kind with every key.
+fn geometries() -> Vec<Value> {
+    let mesh = example_path("meshes").with_file_name("cube_tetrahedra.msh");
+    vec![
+        json!({"box": {
+            "min": [0, 0, 0], "max": [1, 1, 1], "spacing": [0.5, 0.5, 0.25],
+            "grading": {"x": 2, "y": [0, 0.25, 1]}, "jitter": {"fraction": 0.1, "seed": 3}
+        }}),
+        json!({"cylinder": {
+            "base": [0, 1, 2], "axis": "y", "radius": 1, "length": 2, "sector": {"wedge": 30},
+            "divisions": 3, "layers": 2, "grading": [0, 0.25, 1], "radial_grading": 0.5,
+            "taper": [[0, 1], [0.5, 0.9], [1, 1]]
+        }}),
+        json!({"cylinder": {"radius": 1, "length": 2, "sector": "quarter", "divisions": 1, "layers": 1}}),
+        json!({"perforated_box": {
+            "min": [0, 0, 0], "max": [2, 1, 1], "along": "z", "tiles": [2, 1], "diameter": 0.5,
+            "solid": [[1, 0]], "divisions": 2, "rings": 1, "layers": 2, "grading": 2
+        }}),
+        json!({"mesh": {"file": mesh, "scale": 2}}),
+    ]
+}
+
+/// The smallest scene with a geometry.
+fn around(geometry: &Value) -> Value {
+    json!({
+        "geometry": geometry,
+        "material": {"neo_hookean": {"density": 1, "youngs_modulus": 1, "poisson_ratio": 0.3}},
+        "time": {"end": 1}
     })
 }
 
@@ -527,6 +559,8 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.reference_update=always", P, "numerics.reference_update", &["`never`, `every_step`, `every`"]),
         ("numerics.reference_update=every", P, "numerics.reference_update.every", &["needs a value"]),
         ("numerics.reference_update=3", P, "numerics.reference_update", &["one of `never`"]),
+        ("initial.gradient=exact", S, "initial.gradient", &["no initial displacement"]),
+        ("initial.gradient=analytic", P, "initial.gradient", &["`discrete` or `exact`"]),
         // Wrong shapes.
         ("time=[3]", P, "time", &["a list, expected an object", "`end`"]),
         ("time.end=soon", P, "time.end", &["expected a number"]),
@@ -624,10 +658,12 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.smoothing_factor=2.1", S, "numerics.smoothing_factor", &["at most 2"]),
         ("numerics.kernel_option=0", S, "numerics.kernel_option", &["1, 2, 3 or 4"]),
         ("numerics.reference_update={\"every\": 0}", S, "numerics.reference_update.every", &["at least 1"]),
+        ("numerics.dissipation_coefficient=0", S, "numerics.dissipation_coefficient", &["more than 0"]),
+        ("numerics={\"dissipation\": false, \"dissipation_coefficient\": 0.5}", S, "numerics.dissipation_coefficient", &["switched off"]),
         ("numerics.volume_dissipation=0.1", S, "numerics.volume_dissipation", &["`fj` or `fhj`"]),
         ("numerics.volume_dissipation=-0.1", S, "numerics.volume_dissipation", &["0 or more"]),
         ("numerics={\"limiter\": \"minmod\", \"reconstruction\": \"none\"}", S, "numerics.limiter", &["to be `linear`"]),
-        ("numerics={\"limiter\": \"minmod\", \"dissipation\": false}", S, "numerics.limiter", &["switched off"]),
+        ("numerics={\"limiter\": \"shock\", \"dissipation\": false}", S, "numerics.limiter", &["switched off"]),
         ("numerics.cfl=0", S, "numerics.cfl", &["more than 0"]),
         ("numerics.cfl=2.5", S, "numerics.cfl", &["at most 2"]),
         ("numerics.time_step=0", S, "numerics.time_step", &["above 0"]),
@@ -871,6 +907,14 @@ fn the_schema_accepts_what_the_parser_accepts() {
         assert!(ok(&serde_json::from_str(&text).unwrap()), "{name}");
     }
     assert!(ok(&everything()));
+    for geometry in geometries() {
+        let scene = around(&geometry);
+        assert!(ok(&scene), "{geometry}");
+        let read = Scene::from_json(&scene.to_string(), &[]).unwrap_or_else(|e| panic!("{e}"));
+        let text = serde_json::to_string(&read).unwrap();
+        assert!(ok(&serde_json::from_str(&text).unwrap()), "{text}");
+        assert_eq!(Scene::from_json(&text, &[]).unwrap(), read);
+    }
     for (pointer, bad) in [
         ("/material/mooney_rivlin/density", json!(-1)),
         ("/material/mooney_rivlin/poisson_ratio", json!(0.5)),

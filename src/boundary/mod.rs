@@ -2,6 +2,7 @@
 //!
 //! Only the particles of patches are visited: the loops over the body know nothing of boundaries.
 
+mod contact;
 mod heat;
 mod loads;
 mod supports;
@@ -9,11 +10,13 @@ mod supports;
 use crate::error::{Error, Result};
 use crate::formulation::url::{State, Url};
 use crate::layout::{Array, Layout};
-use crate::ledger::Resultant;
+use crate::ledger::{ContactResultant, Resultant};
 use crate::math::*;
 use crate::particles::{Particles, PatchFacets};
 use crate::reference::Reference;
 use crate::scene::{ScalarFunction, Scene, VectorFunction};
+use contact::Wall;
+pub use contact::{Approach, Exchange, WallState};
 use heat::Heat;
 use loads::Load;
 use supports::Supported;
@@ -150,6 +153,8 @@ pub struct Boundary {
     loads: Vec<Load>,
     supports: Vec<Supported>,
     heat: Heat,
+    walls: Vec<Wall>,
+    density: f64,
     body_force: Option<VectorFunction>,
     /// Body's particle to caller's.
     order: Vec<u32>,
@@ -193,6 +198,8 @@ impl Boundary {
             loads: Vec::new(),
             supports: Vec::new(),
             heat: Heat::new(scene)?,
+            walls: contact::walls(scene, particles)?,
+            density: crate::material::Law::of(scene).0.density(),
             body_force: scene.body_force.as_ref().map(|f| f.compile()).transpose()?,
             order: particles.order.clone(),
         };
@@ -218,8 +225,7 @@ impl Boundary {
             this.supports_on(patch, condition, particles, &mut constraints)?;
             this.heat_on(patch, condition, scene)?;
         }
-        let density = crate::material::Law::of(scene).0.density();
-        this.combine_supports(constraints, particles, density)?;
+        this.combine_supports(constraints, particles)?;
         Ok(this)
     }
 
@@ -318,34 +324,58 @@ impl Boundary {
         )
     }
 
-    /// Forces on all particles with loads and support reactions: mass times acceleration [N].
-    /// `span` is a time step, for the acceleration of moving supports.
+    /// Forces on all particles with loads, support reactions and contact: mass times acceleration
+    /// [N]. `span` is a time step, for the acceleration of moving supports.
     pub fn nodal_forces(
         &self,
         url: &Url,
         state: &State,
         reference: &Reference,
-        (t, span): (f64, f64),
+        now: (f64, f64),
         inputs: &InputValues,
+        walls: &[WallState],
     ) -> Result<Array<3>> {
-        let mut force = self.applied_forces(url, state, reference, t, inputs)?;
-        for s in &self.supports {
-            let own = force.get(s.slot);
-            let inertia = scale3(s.mass, self.prescribed_acceleration(s, t, span, inputs)?);
-            force.set(s.slot, add3(sub3(own, mat_vec(&s.projector, own)), inertia));
-        }
+        let mut force = self.applied_forces(url, state, reference, now.0, inputs)?;
+        self.support(&mut force, now, inputs)?;
+        self.contacts(&mut force, state, walls, reference, now)?;
         Ok(force)
     }
 
-    /// Resultants of all patches.
+    /// What the planes of contact do, and their forces on the particles in `force`, which holds all
+    /// others.
+    fn contacts(
+        &self,
+        force: &mut Array<3>,
+        state: &State,
+        walls: &[WallState],
+        reference: &Reference,
+        now: (f64, f64),
+    ) -> Result<Vec<ContactResultant>> {
+        let mut resultants = self.resting_contacts(walls);
+        if resultants.is_empty() {
+            return Ok(resultants);
+        }
+        let motion = (&state.x, &state.v);
+        for (slot, wall, push) in self.contact_forces(force, motion, walls, reference, now)? {
+            let r = &mut resultants[wall];
+            r.force = add3(r.force, push);
+            r.particles += 1;
+            force.set(slot, add3(force.get(slot), push));
+        }
+        Ok(resultants)
+    }
+
+    /// Resultants of all patches and planes.
     pub fn resultants(
         &self,
         url: &Url,
         state: &State,
         reference: &Reference,
-        (t, span): (f64, f64),
+        now: (f64, f64),
         inputs: &InputValues,
-    ) -> Result<Vec<Resultant>> {
+        walls: &[WallState],
+    ) -> Result<(Vec<Resultant>, Vec<ContactResultant>)> {
+        let (t, span) = now;
         let mut resultants: Vec<Resultant> = self
             .members
             .iter()
@@ -372,18 +402,21 @@ impl Boundary {
                 act(load.patch, member.slot, force);
             }
         }
-        if !self.supports.is_empty() {
-            // Reaction = inertia - all other forces, along the constrained directions.
-            let applied = self.applied_forces(url, state, reference, t, inputs)?;
-            for s in &self.supports {
-                let inertia = scale3(s.mass, self.prescribed_acceleration(s, t, span, inputs)?);
-                let reaction = sub3(inertia, applied.get(s.slot));
-                for (patch, share) in &s.shares {
-                    act(*patch, s.slot, mat_vec(share, reaction));
-                }
+        if self.supports.is_empty() && self.walls.is_empty() {
+            return Ok((resultants, Vec::new()));
+        }
+        let mut force = self.applied_forces(url, state, reference, t, inputs)?;
+        // Reaction = inertia - all other forces, along the constrained directions.
+        for s in &self.supports {
+            let inertia = scale3(s.mass, self.prescribed_acceleration(s, t, span, inputs)?);
+            let reaction = sub3(inertia, force.get(s.slot));
+            for (patch, share) in &s.shares {
+                act(*patch, s.slot, mat_vec(share, reaction));
             }
         }
-        Ok(resultants)
+        self.support(&mut force, now, inputs)?;
+        let contacts = self.contacts(&mut force, state, walls, reference, now)?;
+        Ok((resultants, contacts))
     }
 
     /// Index of an input.

@@ -69,22 +69,16 @@ impl Boundary {
         &mut self,
         mut constraints: Vec<Constraint>,
         particles: &Particles,
-        density: f64,
     ) -> Result<()> {
         constraints.sort_by_key(|c| c.particle);
         for group in constraints.chunk_by(|a, b| a.particle == b.particle) {
-            self.supports.push(self.combine(group, particles, density)?);
+            self.supports.push(self.combine(group, particles)?);
         }
         Ok(())
     }
 
     /// All constraints of one particle in one projector.
-    fn combine(
-        &self,
-        group: &[Constraint],
-        particles: &Particles,
-        density: f64,
-    ) -> Result<Supported> {
+    fn combine(&self, group: &[Constraint], particles: &Particles) -> Result<Supported> {
         let body = group[0].particle as usize;
         for (i, a) in group.iter().enumerate() {
             for b in &group[i + 1..] {
@@ -149,7 +143,7 @@ impl Boundary {
             .collect();
         Ok(Supported {
             slot: Layout::slot(body),
-            mass: density * particles.volumes[body],
+            mass: self.density * particles.volumes[body],
             projector,
             shares,
             prescribed,
@@ -198,6 +192,21 @@ impl Boundary {
             .iter()
             .map(|s| dot(mat_vec(&s.projector, force.get(s.slot)), v.get(s.slot)))
             .sum()
+    }
+
+    /// Adds the reactions of the supports to all other forces: the constrained part becomes inertia.
+    pub(super) fn support(
+        &self,
+        force: &mut Array<3>,
+        (t, span): (f64, f64),
+        inputs: &InputValues,
+    ) -> Result<()> {
+        for s in &self.supports {
+            let own = force.get(s.slot);
+            let inertia = scale3(s.mass, self.prescribed_acceleration(s, t, span, inputs)?);
+            force.set(s.slot, add3(sub3(own, mat_vec(&s.projector, own)), inertia));
+        }
+        Ok(())
     }
 
     /// Rate of change of the prescribed velocity at time `t`, by a difference over `span` [m/s^2].

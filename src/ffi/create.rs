@@ -58,13 +58,14 @@ pub extern "C" fn urlsph_status_text(status: i32) -> *const c_char {
 
 /// Creates a simulation from the JSON text of a scene.
 ///
-/// - `json`: NUL-terminated UTF-8.
+/// - `json`: NUL-terminated UTF-8. Files that the scene names, such as a mesh, are relative to the
+///   working directory.
 /// - `options`, `options_size`: NULL and 0 for the defaults, or the options and their size.
 /// - `simulation`: receives the handle; NULL on failure. Release it with `urlsph_destroy`.
 /// - `error`, `error_size`: NULL and 0, or receives what went wrong: there is no handle to ask.
 ///
 /// Errors: `URLSPH_INVALID_ARGUMENT`, `URLSPH_PARSE`, `URLSPH_INVALID_SCENE` with the JSON path or
-/// the particle, `URLSPH_OUT_OF_MEMORY`. Any thread, at any time.
+/// the particle, `URLSPH_IO` for a mesh file, `URLSPH_OUT_OF_MEMORY`. Any thread, at any time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn urlsph_create_from_json(
     json: *const c_char,
@@ -86,7 +87,7 @@ pub unsafe extern "C" fn urlsph_create_from_json(
 
 /// Creates a simulation from the file of a scene.
 ///
-/// - `path`: NUL-terminated UTF-8.
+/// - `path`: NUL-terminated UTF-8. Files that the scene names are relative to its folder.
 /// - The others: as for `urlsph_create_from_json`.
 ///
 /// Errors: those of `urlsph_create_from_json`, and `URLSPH_IO`. Any thread, at any time.

@@ -202,6 +202,7 @@ pub unsafe extern "C" fn urlsph_get_energies(
             ballistic: e.ballistic,
             entropy: e.entropy,
             entropy_production: e.entropy_production,
+            contact_dissipation: e.contact_dissipation,
         };
         // SAFETY: the caller's pointer, as the header's preamble demands.
         unsafe { put_struct(energies, energies_size, &value, "energies") }

@@ -311,8 +311,8 @@ pub struct urlsph_energies {
     /// Energy taken out by the angular-momentum projection since time 0, of either sign.
     pub projection: f64,
     /// What is stored and dissipated less what was supplied and the initial energy: kinetic + strain +
-    /// thermal + plastic work that did not become heat + numerical_dissipation + projection -
-    /// external_work - heat_in - initial energy.
+    /// thermal + plastic work that did not become heat + numerical_dissipation +
+    /// contact_dissipation + projection - external_work - heat_in - initial energy.
     pub closure_error: f64,
     /// Thermal part of the internal energy, from the reference temperature on.
     pub thermal: f64,
@@ -327,6 +327,8 @@ pub struct urlsph_energies {
     pub entropy: f64,
     /// Entropy produced by conduction and plastic flow since time 0 [J/K]: never falls.
     pub entropy_production: f64,
+    /// Kinetic energy lost in inelastic contact since time 0: never falls.
+    pub contact_dissipation: f64,
 }
 
 /// Momenta of the whole body.

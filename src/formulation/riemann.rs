@@ -14,8 +14,15 @@ pub const CONSTANT: u8 = 0;
 pub const LINEAR: u8 = 1;
 /// Linear with the edge-wise minmod limiter.
 pub const MINMOD: u8 = 2;
+/// Linear, but constant in pressure waves that the particles do not resolve.
+pub const SHOCK: u8 = 3;
 /// No dissipation at all.
-pub const OFF: u8 = 3;
+pub const OFF: u8 = 4;
+
+/// Whether the reconstruction needs gradients.
+pub const fn reconstructs(mode: u8) -> bool {
+    matches!(mode, LINEAR | MINMOD | SHOCK)
+}
 
 /// Wave speeds of the linearised law [m/s].
 #[derive(Clone, Copy, Debug)]
@@ -43,14 +50,26 @@ pub struct Pair<T> {
     pub area: Vec3<T>,
 }
 
-/// Jump v_R - v_L at the middle of the pair; `half_a` and `half_b` are half the velocity change
-/// along dx by the gradient of each side.
+/// Jump v_R - v_L at the middle of the pair; `grad_a` and `grad_b` are half the spatial velocity
+/// gradients of both sides. `full` is 1 over the dissipation coefficient, which a shock does without.
 #[inline(always)]
-pub fn jump<T: Lane, const MODE: u8>(pair: &Pair<T>, half_a: Vec3<T>, half_b: Vec3<T>) -> Vec3<T> {
+pub fn jump<T: Lane, const MODE: u8>(
+    pair: &Pair<T>,
+    grad_a: &Mat3<T>,
+    grad_b: &Mat3<T>,
+    full: T,
+) -> Vec3<T> {
+    let Pair { dx, dv, dx2, .. } = *pair;
     match MODE {
-        CONSTANT => pair.dv,
-        MINMOD => limiter::minmod_jump(pair.dv, pair.dx, pair.dx2, half_a, half_b),
-        _ => sub3(pair.dv, add3(half_a, half_b)),
+        CONSTANT => dv,
+        SHOCK => limiter::shock_jump(dv, dx, dx2, &add9(grad_a, grad_b), full),
+        _ => {
+            let (half_a, half_b) = (mat_vec(grad_a, dx), mat_vec(grad_b, dx));
+            match MODE {
+                MINMOD => limiter::minmod_jump(dv, dx, dx2, half_a, half_b),
+                _ => sub3(dv, add3(half_a, half_b)),
+            }
+        }
     }
 }
 

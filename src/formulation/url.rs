@@ -120,6 +120,7 @@ pub enum Trouble {
 #[derive(Debug, Clone, Copy)]
 struct Options {
     mode: u8,
+    coefficient: f64,
     venkatakrishnan: bool,
     volume_dissipation: f64,
     linear: bool,
@@ -170,6 +171,17 @@ impl State {
     pub fn history_at(&self, slot: usize) -> History<f64> {
         self.history.as_ref().map_or(VIRGIN, |h| h.get(slot))
     }
+    /// Sets f of the particle in a slot, and h and j where they are independent.
+    pub fn deform(&mut self, slot: usize, f: Mat3<f64>) {
+        let cof = cofactor(&f);
+        self.f.set(slot, flat(&f));
+        if let Some(h) = &mut self.h {
+            h.set(slot, flat(&cof));
+        }
+        if let Some(j) = &mut self.j {
+            j.set(slot, [dot(f[0], cof[0])]);
+        }
+    }
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.x.bytes()
@@ -196,15 +208,18 @@ impl Url {
             (false, ..) => riemann::OFF,
             (true, false, _) => riemann::CONSTANT,
             (true, true, Limiter::Minmod) => riemann::MINMOD,
+            (true, true, Limiter::Shock) => riemann::SHOCK,
             (true, true, _) => riemann::LINEAR,
         };
         let volume = numerics.volume_dissipation > 0.0;
         let conduction = thermal.filter(|t| t.conductivity > 0.0);
-        let areas = mode != riemann::OFF || volume || conduction.is_some();
+        let bound = reference.is_bound_by_areas();
+        let areas = mode != riemann::OFF || volume || bound || conduction.is_some();
         Self {
             law,
             options: Options {
                 mode,
+                coefficient: numerics.dissipation_coefficient,
                 venkatakrishnan: numerics.limiter == Limiter::Venkatakrishnan,
                 volume_dissipation: numerics.volume_dissipation,
                 linear,
@@ -213,8 +228,7 @@ impl Url {
             scratch: Scratch {
                 q: Array::new(layout, [0.0; 9]),
                 s: areas.then(|| Array::new(layout, [0.0; 9])),
-                half_grad: matches!(mode, riemann::LINEAR | riemann::MINMOD)
-                    .then(|| Array::new(layout, [0.0; 9])),
+                half_grad: riemann::reconstructs(mode).then(|| Array::new(layout, [0.0; 9])),
                 wave: Array::new(layout, [1.0; 2]),
                 sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
                 theta: thermal.map(|_| Array::new(layout, [1.0; 2])),
@@ -310,23 +324,28 @@ impl Url {
         }
     }
 
-    /// Sets the temperature [K] of the particle in a slot at its present deformation; the heat that
-    /// this takes [J].
+    /// Sets the temperature [K] of the particle in a slot at its present deformation; the entropy
+    /// [J/K] and the heat [J] that this takes.
     pub fn set_temperature(
         &self,
         state: &mut State,
         reference: &Reference,
         slot: usize,
         theta: f64,
-    ) -> f64 {
+    ) -> (f64, f64) {
         let d = self.deformation(state, reference, slot);
         let (Some(eta), Some(thermal)) = (&mut state.eta, self.options.thermal) else {
-            return 0.0;
+            return (0.0, 0.0);
         };
-        let before = thermal.warmth(&d, eta.get(slot)[0]).energy;
-        eta.set(slot, [thermal.entropy(&d, theta)]);
-        let after = thermal.warmth(&d, eta.get(slot)[0]).energy;
-        reference.volume.get(slot)[0] * (after - before)
+        let before = eta.get(slot)[0];
+        let after = thermal.entropy(&d, theta);
+        eta.set(slot, [after]);
+        let energy = |eta| thermal.warmth(&d, eta).energy;
+        let volume = reference.volume.get(slot)[0];
+        (
+            volume * (after - before),
+            volume * (energy(after) - energy(before)),
+        )
     }
 
     /// Constants of a body with heat.
@@ -503,26 +522,27 @@ impl Url {
 
     /// Force pass; power of the dissipation and squared length by slab.
     fn forces<R: Runner>(&mut self, state: &State, reference: &Reference) -> Vec<(f64, f64)> {
-        let speeds = self.wave_speeds();
+        let (speeds, density) = (self.wave_speeds(), self.law.density());
         let Self {
             options,
             scratch,
             rates,
             ..
         } = self;
+        let coefficient = options.coefficient;
         let input = ForceInput::new(state, reference, scratch);
         parallel::map_slabs(rates.force.slabs_mut(), |slab, out| {
             macro_rules! forces {
                 ($pairs:expr, $($mode:ident),*) => {
                     match options.mode {
                         $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
-                            pairs: $pairs, input, speeds, slab, out,
+                            pairs: $pairs, input, speeds, coefficient, density, slab, out,
                         }),)*
-                        _ => unreachable!("four modes"),
+                        _ => unreachable!("five modes"),
                     }
                 };
             }
-            with_pairs!(reference, pairs => forces!(pairs, CONSTANT, LINEAR, MINMOD, OFF))
+            with_pairs!(reference, pairs => forces!(pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF))
         })
     }
 
@@ -677,7 +697,7 @@ impl Url {
         }
         new.chi.copy_from(&state.x);
         reference.updated = Some(new);
-        if let Err(slot) = reference.rebuild() {
+        if let Err(slot) = reference.update() {
             reference.updated = Some(old);
             reference.rebuild().expect("it could be built before");
             let ratio = self.deformation(state, reference, slot).j;
@@ -787,16 +807,7 @@ pub fn deform(state: &mut State, reference: &Reference) {
         gradient::<Vectors>(reference, x, slab, &mut out);
     });
     for slot in (0..layout.particles).map(Layout::slot) {
-        let own = f.get(slot);
-        let m = matrix(&own);
-        let cof = cofactor(&m);
-        state.f.set(slot, own);
-        if let Some(h) = &mut state.h {
-            h.set(slot, flat(&cof));
-        }
-        if let Some(j) = &mut state.j {
-            j.set(slot, [dot(m[0], cof[0])]);
-        }
+        state.deform(slot, matrix(&f.get(slot)));
     }
 }
 
@@ -866,6 +877,7 @@ mod tests {
                 "numerics.limiter=minmod",
                 "numerics.weights=tributary",
             ],
+            &["numerics.limiter=shock"],
             &[
                 "numerics.neighbours={\"radius\": 2.1}",
                 "numerics.limiter=venkatakrishnan",
@@ -883,6 +895,13 @@ mod tests {
                 "numerics.kernel_option=4",
                 "numerics.reference_update=every_step",
                 "numerics.weights=tributary",
+            ],
+            &["numerics.operators=repaired"],
+            &["numerics.operators=repaired", "numerics.dissipation=false"],
+            &[
+                "numerics.operators=repaired",
+                "numerics.kernel_option=4",
+                "numerics.reference_update=every_step",
             ],
             &["numerics.state=fj", "numerics.volume_dissipation=0.1"],
             &[

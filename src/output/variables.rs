@@ -59,6 +59,9 @@ enum Source {
     PatchMaximumTemperature(usize),
     /// Whether it changes with an input at once.
     StableStep(bool),
+    ContactForce(usize),
+    ContactImpulse(usize),
+    ContactParticles(usize),
     Steps,
     PatchInitialPositions(usize),
     PatchAreas(usize),
@@ -78,7 +81,7 @@ impl OutputVariable {
     }
     /// Whether the values count something.
     pub fn is_integer(&self) -> bool {
-        self.source == Source::Steps
+        matches!(self.source, Source::Steps | Source::ContactParticles(_))
     }
     /// Whether the values are settled by the geometry and never change.
     pub fn is_fixed(&self) -> bool {
@@ -98,6 +101,7 @@ impl OutputVariable {
                 | Source::PatchMoment(_)
                 | Source::PatchHeatFlow(_)
                 | Source::StableStep(true)
+                | Source::ContactForce(_)
                 | Source::Field(Field::NodalForce)
         )
     }
@@ -205,6 +209,7 @@ enum Needs {
     Nothing,
     Heat,
     Plasticity,
+    Contact,
 }
 
 /// A number of the ledger: what it needs, name, unit, description, value.
@@ -265,6 +270,13 @@ const ENERGIES: &[LedgerRow] = &[
         "J",
         "Energy dissipated by the scheme since time 0",
         |e| e.numerical_dissipation,
+    ),
+    (
+        Needs::Contact,
+        "energy.contact_dissipation",
+        "J",
+        "Kinetic energy lost in inelastic contact since time 0",
+        |e| e.contact_dissipation,
     ),
     (
         Needs::Nothing,
@@ -349,6 +361,7 @@ pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
             Needs::Nothing => true,
             Needs::Heat => heat,
             Needs::Plasticity => plasticity,
+            Needs::Contact => simulation.contact_names().next().is_some(),
         };
         if has {
             add(
@@ -441,6 +454,41 @@ pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
                 unit,
                 1,
                 format!("{text} patch {name}"),
+                source,
+            );
+        }
+    }
+    for (wall, name) in simulation.contact_names().enumerate() {
+        let part = name_part(name);
+        let quantities = [
+            (
+                "force",
+                "N",
+                3,
+                "Force on the body of",
+                Source::ContactForce(wall),
+            ),
+            (
+                "impulse",
+                "N.s",
+                3,
+                "Impulse on the body since time 0 of",
+                Source::ContactImpulse(wall),
+            ),
+            (
+                "particles",
+                "1",
+                1,
+                "Number of particles that touch",
+                Source::ContactParticles(wall),
+            ),
+        ];
+        for (quantity, unit, components, text, source) in quantities {
+            add(
+                format!("contact.{part}.{quantity}"),
+                unit,
+                components,
+                format!("{text} plane {name}"),
                 source,
             );
         }
@@ -615,6 +663,9 @@ impl Reader {
                 out[0] = self.heat(simulation, p, variable)?.maximum_temperature;
             }
             Source::StableStep(_) => out[0] = simulation.stable_step(),
+            Source::ContactForce(w) => out.copy_from_slice(&simulation.contact(w).force),
+            Source::ContactImpulse(w) => out.copy_from_slice(&simulation.contact(w).impulse),
+            Source::ContactParticles(w) => out[0] = simulation.contact(w).particles as f64,
             // Exact up to 2^53 steps.
             Source::Steps => out[0] = simulation.steps() as f64,
             Source::PatchAreas(p) => out.copy_from_slice(&simulation.patches()[p].areas),

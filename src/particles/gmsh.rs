@@ -284,6 +284,9 @@ impl<'a> Reader<'a> {
             self.skip_space();
             let place = self.at;
             let end = self.line();
+            if end.is_empty() {
+                return Err(self.truncated());
+            }
             if end.strip_prefix("$End") != Some(name) {
                 let shown: String = end.chars().take(40).collect();
                 return Err(self.wrong(
@@ -462,7 +465,9 @@ impl<'a> Reader<'a> {
 
     fn nodes(&mut self, raw: &mut Raw) -> Result<()> {
         let (blocks, count) = (self.size()?, self.size()?);
-        (self.size()?, self.size()?);
+        // The smallest and the largest tag.
+        self.size()?;
+        self.size()?;
         self.announce(raw, count)?;
         for _ in 0..blocks {
             let (dimension, _, parametric) = (self.int()?, self.int()?, self.int()?);
@@ -560,7 +565,9 @@ impl<'a> Reader<'a> {
 
     fn elements(&mut self, raw: &mut Raw) -> Result<()> {
         let (blocks, announced) = (self.size()?, self.size()?);
-        (self.size()?, self.size()?);
+        // The smallest and the largest tag.
+        self.size()?;
+        self.size()?;
         let mut read = 0u64;
         for _ in 0..blocks {
             let place = self.place();

@@ -558,6 +558,36 @@ impl Mesh {
         list
     }
 
+    /// Numbers and sizes of the cells.
+    pub fn summary(&self, positions: &[[f64; 3]]) -> MeshSummary {
+        let mut summary = MeshSummary {
+            cells: Vec::new(),
+            cell_volume: (f64::INFINITY, 0.0),
+            shortest_edge: f64::INFINITY,
+            notes: Vec::new(),
+        };
+        for kind in [CellKind::Tetrahedron, CellKind::Prism, CellKind::Hexahedron] {
+            let count = self.cells.iter().filter(|c| c.kind == kind).count();
+            if count > 0 {
+                summary.cells.push((kind.plural(), count));
+            }
+        }
+        for cell in &self.cells {
+            let volume: f64 = cell.volumes(positions).iter().sum();
+            let (least, most) = &mut summary.cell_volume;
+            (*least, *most) = (least.min(volume), most.max(volume));
+            for face in cell.kind.faces() {
+                for (i, a) in face.iter().enumerate() {
+                    let b = face[(i + 1) % face.len()];
+                    let [x, y] = [*a, b].map(|n| positions[cell.nodes[n] as usize]);
+                    let edge = dot(sub3(x, y), sub3(x, y)).sqrt();
+                    summary.shortest_edge = summary.shortest_edge.min(edge);
+                }
+            }
+        }
+        summary
+    }
+
     /// Interpolation with the shape functions of the cell that a point lies in.
     pub fn interpolation(
         &self,
@@ -597,6 +627,19 @@ impl Mesh {
         let sum: f64 = weights.clone().map(|(_, n)| n).sum();
         Some(weights.map(|(node, n)| (*node, n / sum)).collect())
     }
+}
+
+/// Numbers and sizes of the cells of a mesh, and what its reader has to say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshSummary {
+    /// Kinds of cells that there are, in the plural, and how many.
+    pub cells: Vec<(&'static str, usize)>,
+    /// Volume of the smallest and of the largest cell [m^3].
+    pub cell_volume: (f64, f64),
+    /// Length of the shortest edge [m].
+    pub shortest_edge: f64,
+    /// What of a mesh file was left out or changed, one line each.
+    pub notes: Vec<String>,
 }
 
 /// What neighbours have in common.

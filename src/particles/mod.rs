@@ -18,7 +18,7 @@ use crate::scene::{Geometry, PatchSelection, Scene};
 
 pub use gmsh::MeshFile;
 pub use lattice::Lattice;
-pub use mesh::{CellKind, Mesh, Sharing};
+pub use mesh::{Mesh, MeshSummary, Sharing};
 
 /// The points of a body, in the body's order, which keeps neighbours close in memory.
 #[derive(Debug, Clone)]
@@ -124,6 +124,18 @@ impl Particles {
     /// Caller's number of a body's particle.
     pub fn caller(&self, body: usize) -> usize {
         self.order[body] as usize
+    }
+
+    /// Numbers and sizes of the cells, where there is a mesh.
+    pub fn mesh_summary(&self, scene: &Scene) -> Option<MeshSummary> {
+        let Shape::Mesh(mesh) = &self.shape else {
+            return None;
+        };
+        let mut summary = mesh.summary(&self.positions);
+        if let Geometry::Mesh(file) = &scene.geometry {
+            summary.notes = file.content().map_or(Vec::new(), |m| m.notes().to_vec());
+        }
+        Some(summary)
     }
 
     /// Interpolation at a point: (particle, weight), the weights add up to 1; a point on a particle

@@ -176,7 +176,7 @@ fn cylinders_satisfy_the_identities() {
             r#""divisions": 5, "sector": {"wedge": 120}"#,
             RIGHT / 0.75,
             10,
-            38,
+            36,
         ),
     ] {
         let volume = 2.0 * 0.25 * polygon(angle, segments);
@@ -440,9 +440,9 @@ fn write_msh(grid: &mesh::Grid, modern: bool, binary: bool, swapped: bool) -> Ve
     });
     let cells = grid.cells.iter().enumerate().map(|(i, c)| {
         let number = match c.kind {
-            CellKind::Tetrahedron => 4,
-            CellKind::Hexahedron => 5,
-            CellKind::Prism => 6,
+            mesh::CellKind::Tetrahedron => 4,
+            mesh::CellKind::Hexahedron => 5,
+            mesh::CellKind::Prism => 6,
         };
         (3, 1, number, 100 + i, c.nodes().to_vec())
     });

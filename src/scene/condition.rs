@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::validate::require;
+use super::validate::{finite, require};
 use super::value::{Scalar, ScalarFunction, Vector, VectorFunction, below};
 use crate::error::{Error, Result};
 
@@ -65,6 +65,45 @@ pub enum Support {
     Antisymmetry,
 }
 
+/// How the initial deformation gradient follows from the displacement.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InitialGradient {
+    /// By the operators from the displaced particles: the two never part. On a surface it is of first order.
+    #[default]
+    Discrete,
+    /// That of the expressions, so that a solution which starts deformed starts from its exact strain.
+    Exact,
+}
+
+fn is_default(gradient: &InitialGradient) -> bool {
+    *gradient == InitialGradient::default()
+}
+
+/// A rigid frictionless plane that particles touch, slide along and leave.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Wall {
+    /// A point of the plane at time 0 [m].
+    pub point: [f64; 3],
+    /// Normal of the plane, towards the body; of any length.
+    pub normal: [f64; 3],
+    /// The patch whose particles it stops; without it all particles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patch: Option<String>,
+    /// Whether a particle that touches the plane may leave it; `false`: it slides along the plane from
+    /// then on, as on rollers.
+    #[serde(default = "separation")]
+    pub separation: bool,
+    /// Velocity of the plane along its normal [m/s]: a number, an expression in `t` or a table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Scalar>,
+}
+
+fn separation() -> bool {
+    true
+}
+
 /// Initial state, by components in X, Y, Z [m] of the initial configuration.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -72,9 +111,12 @@ pub struct Initial {
     /// Velocity [m/s].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Vector>,
-    /// Displacement [m]; the deformation gradient follows from it by the discrete gradient.
+    /// Displacement [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displacement: Option<Vector>,
+    /// How the deformation gradient follows from the displacement.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub gradient: InitialGradient,
     /// Temperature [K]; needs the section `heat`, whose reference temperature is the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Scalar>,
@@ -134,7 +176,39 @@ pub(super) fn validate(path: &str, condition: &Condition) -> Result<()> {
     Ok(())
 }
 
+pub(super) fn wall(path: &str, wall: &Wall) -> Result<()> {
+    finite(&format!("{path}.point"), &wall.point)?;
+    let place = format!("{path}.normal");
+    finite(&place, &wall.normal)?;
+    let length = wall.normal.iter().map(|n| n * n).sum::<f64>();
+    require(
+        length.is_normal(),
+        &place,
+        "a normal has a direction: give three numbers that are not all 0",
+    )?;
+    if let Some(velocity) = &wall.velocity {
+        let place = format!("{path}.velocity");
+        let function = scalar(&place, velocity, |_| true, "")?;
+        require(
+            !matches!(function, ScalarFunction::External { .. }),
+            &place,
+            "a plane cannot be driven from outside: give a number, an expression in t or a table",
+        )?;
+        require(
+            !function.depends_on_space(),
+            &place,
+            "a rigid plane has one velocity: the expression may depend on t only",
+        )?;
+    }
+    Ok(())
+}
+
 pub(super) fn initial(initial: &Initial) -> Result<()> {
+    require(
+        initial.displacement.is_some() || is_default(&initial.gradient),
+        "initial.gradient",
+        "there is no initial displacement that has a gradient: add `initial.displacement`",
+    )?;
     if let Some(temperature) = &initial.temperature {
         let path = "initial.temperature";
         require(

@@ -379,6 +379,21 @@ impl MeshGeometry {
         Ok(())
     }
 
+    fn pack(&mut self) -> Result<(String, Vec<u8>)> {
+        const NAME: &str = "mesh.msh";
+        let bytes =
+            read_file(Path::new(&self.file)).map_err(|e| e.at_path("geometry.mesh.file"))?;
+        if xxh3_64(&bytes) != self.content_hash() {
+            return Err(Error::new(
+                Code::Io,
+                format!("the mesh {} has changed since it was read", self.file),
+            )
+            .at_path("geometry.mesh.file"));
+        }
+        self.file = NAME.to_owned();
+        Ok((NAME.to_owned(), bytes))
+    }
+
     /// What the file holds.
     ///
     /// # Errors
@@ -543,6 +558,14 @@ impl Geometry {
             Geometry::Cylinder(cylinder) => cylinder.faces(),
             Geometry::PerforatedBox(perforated) => perforated.faces(),
             Geometry::Mesh(mesh) => mesh.content().map_or(Vec::new(), |m| m.names().to_vec()),
+        }
+    }
+
+    /// Names the files that the geometry keeps without a folder, and returns them with their content.
+    pub(super) fn pack(&mut self) -> Result<Vec<(String, Vec<u8>)>> {
+        match self {
+            Geometry::Mesh(mesh) => mesh.pack().map(|file| vec![file]),
+            _ => Ok(Vec::new()),
         }
     }
 

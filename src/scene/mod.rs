@@ -23,7 +23,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::particles::MeshFile;
-pub use condition::{Condition, Convection, Initial, Support};
+pub use condition::{Condition, Convection, Initial, InitialGradient, Support, Wall};
 pub use expression::Expression;
 pub use geometry::{
     Axis, AxisGrading, BoxGeometry, CylinderGeometry, Geometry, Grading, Jitter, MeshGeometry,
@@ -32,7 +32,8 @@ pub use geometry::{
 pub use heat::Heat;
 pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
-    Limiter, Neighbours, Numerics, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
+    Limiter, Neighbours, Numerics, Operators, Reconstruction, ReferenceUpdate, StateMeasures,
+    Weights,
 };
 pub use schema::json_schema;
 pub use value::{Interpolation, Scalar, ScalarFunction, Table, Vector, VectorFunction};
@@ -59,6 +60,9 @@ pub struct Scene {
     /// Conditions by patch name. A patch without an entry is free of traction.
     #[serde(default)]
     pub boundary: BTreeMap<String, Condition>,
+    /// Rigid frictionless planes by name, which particles touch, slide along and leave.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub contact: BTreeMap<String, Wall>,
     /// Body force per unit initial volume f_R [N/m^3].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_force: Option<Vector>,
@@ -102,6 +106,9 @@ pub struct Output {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fields: Option<Vec<String>>,
 }
+
+/// Files by name, with their content.
+pub type Files = Vec<(String, Vec<u8>)>;
 
 impl Scene {
     /// Parses and validates a scene; `overrides` are `path=value` texts applied to the JSON first,
@@ -160,5 +167,26 @@ impl Scene {
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::from_json_in(&text, overrides, folder)
             .map_err(|e| e.with_note(&format!("in {}", path.display())))
+    }
+
+    /// The scene with the files that it names beside it, and those files by name with their content:
+    /// what a folder needs to run it elsewhere.
+    ///
+    /// # Errors
+    /// [`Code::Io`] for a file that cannot be read, or that has changed since the scene was made.
+    pub fn packed(&self) -> Result<(Self, Files)> {
+        let mut scene = self.clone();
+        let files = scene.geometry.pack()?;
+        Ok((scene, files))
+    }
+
+    /// The scene with the hash of each file's content in place of its path: equal for equal bodies,
+    /// wherever their files are.
+    pub(crate) fn of_content(&self) -> Self {
+        let mut scene = self.clone();
+        if let Geometry::Mesh(mesh) = &mut scene.geometry {
+            mesh.file = format!("{:016x}", mesh.content_hash());
+        }
+        scene
     }
 }

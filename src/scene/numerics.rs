@@ -15,6 +15,10 @@ use crate::error::Result;
 pub struct Numerics {
     /// Neighbours of a particle.
     pub neighbours: Neighbours,
+    /// What gradients and forces are made of; default `kernel` where the particles form a lattice,
+    /// or where `weights` are `tributary`, and `repaired` elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operators: Option<Operators>,
     /// Weights inside the kernel gradient.
     pub weights: Weights,
     /// Smoothing factor f_h: h_b = f_h x largest distance to a neighbour ([URL22] 37).
@@ -32,6 +36,11 @@ pub struct Numerics {
     pub limiter: Limiter,
     /// Riemann dissipation of the momentum equation, D^p; `false` leaves it out.
     pub dissipation: bool,
+    /// Share of D^p in flow that the reconstruction resolves, above 0 and at most 1. Less of it is more
+    /// accurate where the dissipation is the largest error, as in metal impact, and damps
+    /// the shortest waves less. What the `shock` limiter adds is not reduced.
+    #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0))]
+    pub dissipation_coefficient: f64,
     /// Coefficient of the dissipation D^j of the volume equation; needs `j` among the unknowns. 0 leaves it out.
     pub volume_dissipation: f64,
     /// Projection of the internal forces that conserves angular momentum ([URL22] section 6).
@@ -48,6 +57,7 @@ impl Default for Numerics {
     fn default() -> Self {
         Self {
             neighbours: Neighbours::Lattice(18),
+            operators: None,
             weights: Weights::Unit,
             smoothing_factor: 0.6,
             kernel_option: 1,
@@ -56,6 +66,7 @@ impl Default for Numerics {
             reconstruction: Reconstruction::Linear,
             limiter: Limiter::None,
             dissipation: true,
+            dissipation_coefficient: 1.0,
             volume_dissipation: 0.0,
             angular_momentum_projection: false,
             cfl: None,
@@ -65,6 +76,11 @@ impl Default for Numerics {
 }
 
 impl Numerics {
+    /// Whether an update recomputes the kernels, and with them the repair of the operators.
+    pub(crate) fn redoes_the_repair(&self) -> bool {
+        self.kernel_option >= 3 && self.reference_update != ReferenceUpdate::Never
+    }
+
     /// The CFL number: the scene's, or the one that is proven stable for the largest number of
     /// neighbours of a particle.
     pub fn cfl_number(&self, neighbours: usize) -> f64 {
@@ -72,17 +88,32 @@ impl Numerics {
     }
 }
 
-/// 6, 18 or 26 lattice neighbours, or `{"radius": r}`.
+/// 6, 18 or 26 neighbours of a lattice or a mesh, or `{"radius": r}`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged, deny_unknown_fields)]
 pub enum Neighbours {
-    /// 6, 18 or 26 neighbours that share a lattice cell.
+    /// Neighbours on a lattice: 6 that share an edge of a cell, 18 that share a face, or 26 that share
+    /// a cell. On a mesh the same as far as the cells go: in tetrahedra all three are the edges.
     Lattice(#[schemars(extend("enum" = [6, 18, 26]))] u8),
-    /// All particles within a radius, in multiples of the largest lattice spacing.
+    /// All particles within a radius, in multiples of the largest lattice spacing; on a mesh, of the
+    /// mean length of the edges at either particle, and only what hangs together within the radius.
     Radius {
         /// Radius over spacing.
         radius: f64,
     },
+}
+
+/// What gradients and forces are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Operators {
+    /// Corrected kernel gradients ([URL22] 42, 58): closed on a lattice.
+    Kernel,
+    /// Corrected kernel gradients with the smallest change that makes a uniform stress force-free on
+    /// any particles.
+    Repaired,
+    /// Gradients of the shape functions of the mesh: exact too, without a kernel.
+    Mesh,
 }
 
 /// Weights inside the kernel gradient.
@@ -139,6 +170,9 @@ pub enum Limiter {
     Venkatakrishnan,
     /// Edge-wise minmod.
     Minmod,
+    /// First order in pressure waves that the particles do not resolve; smooth flow and shear are
+    /// left alone.
+    Shock,
 }
 
 impl<'de> Deserialize<'de> for Neighbours {
@@ -187,6 +221,17 @@ pub(super) fn validate(n: &Numerics) -> Result<()> {
         )?,
     }
     require(
+        n.weights == Weights::Unit || matches!(n.operators, None | Some(Operators::Kernel)),
+        "numerics.weights",
+        "tributary weights belong to the operators `kernel`",
+    )?;
+    require(
+        n.operators != Some(Operators::Mesh) || !n.redoes_the_repair(),
+        "numerics.kernel_option",
+        "options 3 and 4 recompute kernels, and the operators `mesh` have none: set 1 or 2, or the \
+         operators `repaired`",
+    )?;
+    require(
         n.smoothing_factor > 0.5 && n.smoothing_factor <= 2.0,
         "numerics.smoothing_factor",
         &format!(
@@ -216,6 +261,20 @@ pub(super) fn validate(n: &Numerics) -> Result<()> {
         n.volume_dissipation == 0.0 || n.state != StateMeasures::F,
         "numerics.volume_dissipation",
         "it acts on the volume equation, which needs `state` to be `fj` or `fhj`",
+    )?;
+    let coefficient = n.dissipation_coefficient;
+    require(
+        coefficient > 0.0 && coefficient <= 1.0,
+        "numerics.dissipation_coefficient",
+        &format!(
+            "expected more than 0 and at most 1 instead of {coefficient}; `dissipation` set to false \
+             leaves D^p out"
+        ),
+    )?;
+    require(
+        n.dissipation || coefficient == 1.0,
+        "numerics.dissipation_coefficient",
+        "the dissipation is switched off; set `dissipation` to true or leave the coefficient out",
     )?;
     if n.limiter != Limiter::None {
         require(

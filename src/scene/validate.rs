@@ -77,6 +77,21 @@ impl Scene {
                 .at_boundary(name));
             }
         }
+        for (name, wall) in &self.contact {
+            let path = key("contact", name);
+            valid_name(&path, name)?;
+            condition::wall(&path, wall)?;
+            if let Some(patch) = &wall.patch
+                && !faces.contains(patch)
+                && !self.patches.contains_key(patch)
+            {
+                let known = self.patches.keys().chain(&faces);
+                return Err(Error::scene(
+                    format!("{path}.patch"),
+                    format!("there is no patch `{patch}`; there are {}", listed(known)),
+                ));
+            }
+        }
         Ok(())
     }
 

@@ -16,8 +16,14 @@ fn omega() -> f64 {
     0.75_f64.sqrt() * PI * ((LAMBDA + 2.0 * MU) / DENSITY).sqrt()
 }
 
-/// Gradient of the mode shape u = (s c c, c s c, c c s), s and c of pi X_i / 2.
-fn gradient(x: &[f64]) -> [[f64; 3]; 3] {
+/// Mode shape u = (s c c, c s c, c c s), s and c of pi X_i / 2.
+pub fn shape(x: &[f64]) -> [f64; 3] {
+    let [s, c] = [f64::sin, f64::cos].map(|f| [0, 1, 2].map(|i| f(0.5 * PI * x[i])));
+    [s[0] * c[1] * c[2], c[0] * s[1] * c[2], c[0] * c[1] * s[2]]
+}
+
+/// Its gradient.
+pub fn gradient(x: &[f64]) -> [[f64; 3]; 3] {
     let k = 0.5 * PI;
     let s: Vec<f64> = x.iter().map(|x| (k * x).sin()).collect();
     let c: Vec<f64> = x.iter().map(|x| (k * x).cos()).collect();
@@ -55,12 +61,7 @@ fn errors(nodes: usize, time: f64, amplitude: f64, overrides: &[&str]) -> Errors
     let phase = omega() * time;
     let mut sums = [[0.0; 2]; 2];
     for (a, x) in positions.chunks_exact(3).enumerate() {
-        let (s, c) = (
-            |i: usize| (0.5 * PI * x[i]).sin(),
-            |i: usize| (0.5 * PI * x[i]).cos(),
-        );
-        let shape = [s(0) * c(1) * c(2), c(0) * s(1) * c(2), c(0) * c(1) * s(2)];
-        let g = gradient(x);
+        let (shape, g) = (shape(x), gradient(x));
         let trace = g[0][0] + g[1][1] + g[2][2];
         for i in 0..3 {
             let peak = amplitude * omega() * shape[i];

@@ -2,10 +2,17 @@
 //! laws. Every check prints its residual and tolerance (`cargo test --release --test acceptance --
 //! --nocapture`); `cargo xtask validate` runs the long ones, which are ignored here.
 
+mod cable;
 mod columns;
 mod conservation;
 mod elastic_cube;
+mod heat;
+mod homogeneous;
 mod numerics;
+mod punch;
 mod reproducibility;
+mod slab_heating;
 mod stability;
 mod support;
+mod swinging_cube;
+mod thermo_wave;

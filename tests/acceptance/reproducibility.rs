@@ -4,6 +4,8 @@ use urlsph::{Simulation, Snapshot};
 
 use crate::support::*;
 
+const JITTERED: &[&str] = &["geometry.box.jitter={\"fraction\": 0.2}"];
+
 /// Scenes and options that take different paths through the solver.
 const VARIANTS: &[(&str, &[&str])] = &[
     ("column_bending", &[]),
@@ -50,6 +52,7 @@ const VARIANTS: &[(&str, &[&str])] = &[
         "column_bending",
         &["numerics.limiter=minmod", "numerics.weights=tributary"],
     ),
+    ("column_tension", &["numerics.limiter=shock"]),
     (
         "column_bending",
         &[
@@ -61,8 +64,53 @@ const VARIANTS: &[(&str, &[&str])] = &[
         "column_tension",
         &["numerics.reconstruction=none", "numerics.neighbours=6"],
     ),
+    ("column_twisting", JITTERED),
+    (
+        "column_twisting",
+        &[
+            JITTERED[0],
+            "numerics.kernel_option=4",
+            "numerics.reference_update={\"every\": 2}",
+            "numerics.angular_momentum_projection=true",
+        ],
+    ),
+    (
+        "column_bending",
+        &[
+            JITTERED[0],
+            "numerics.operators=mesh",
+            "numerics.neighbours=26",
+            "numerics.dissipation=false",
+        ],
+    ),
     ("l_block", &[]),
     ("elastic_cube", &["numerics.neighbours={\"radius\": 2.1}"]),
+    ("swinging_cube", &[]),
+    (
+        "l_block_thermal",
+        &[
+            "numerics.reference_update={\"every\": 3}",
+            "heat.gruneisen_exponent=0.5",
+            "heat.source=X*t",
+        ],
+    ),
+    (
+        "slab_heating",
+        &[
+            "geometry.box.max=[1, 0.5, 0.5]",
+            "geometry.box.spacing=0.0625",
+            "heat.gruneisen_coefficient=2",
+            "boundary.x_max={\"convection\": {\"coefficient\": 2e4, \"ambient_temperature\": 300}}",
+            "boundary.y_min.temperature=293.15 + 1e3*t",
+        ],
+    ),
+    (
+        "column_twisting",
+        &[
+            "material={\"von_mises\": {\"density\": 1100, \"youngs_modulus\": 1.7e7, \"poisson_ratio\": 0.3, \"yield_stress\": 1e5}}",
+            "heat={\"specific_heat\": 1, \"reference_temperature\": 293.15, \"conductivity\": 10, \"gruneisen_coefficient\": 2}",
+        ],
+    ),
 ];
 
 /// Twelve steps in two calls, so that the time step meets an end that is not its own.
@@ -135,7 +183,7 @@ fn a_restored_run_gives_the_same_bits() {
         );
         let resultants = |s: &Simulation| {
             (0..s.patches().len())
-                .map(|p| s.resultant(p))
+                .map(|p| (s.resultant(p), s.heat_resultant(p)))
                 .collect::<Vec<_>>()
         };
         assert_eq!(

@@ -1,6 +1,6 @@
 //! What the acceptance tests share: scenes of the examples, runs step by step, reference tables.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use urlsph::{Field, Scene, Simulation};
 
@@ -17,7 +17,8 @@ pub const M3: Model = Model("M3", 1.0 / 8.0);
 /// 17 x 97 x 17 particles.
 pub const M4: Model = Model("M4", 1.0 / 16.0);
 
-fn example(case: &str, file: &str) -> PathBuf {
+/// A file of an example.
+pub fn example(case: &str, file: &str) -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "examples", case, file]
         .iter()
         .collect()
@@ -114,7 +115,11 @@ pub struct Table {
 impl Table {
     /// The reference solution of an example.
     pub fn expected(case: &str) -> Self {
-        let path = example(case, "expected.csv");
+        Self::read(&example(case, "expected.csv"))
+    }
+
+    /// The table in a file.
+    pub fn read(path: &Path) -> Self {
         let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
         let mut lines = text.lines();
         let names = lines

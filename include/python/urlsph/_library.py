@@ -157,6 +157,7 @@ class EnergiesStruct(Structure):
         ("ballistic", c_double),
         ("entropy", c_double),
         ("entropy_production", c_double),
+        ("contact_dissipation", c_double),
     ]
 
 

@@ -58,6 +58,7 @@ class Energies(NamedTuple):
     ballistic: float
     entropy: float
     entropy_production: float
+    contact_dissipation: float
 
 
 class Momenta(NamedTuple):

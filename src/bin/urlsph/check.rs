@@ -16,6 +16,25 @@ pub fn report(simulation: &Simulation) -> String {
         line("scene", scene.title.clone());
     }
     line("particles", grouped(plan.particles as u64));
+    if let Some(mesh) = &plan.mesh {
+        let cells: Vec<String> = mesh
+            .cells
+            .iter()
+            .map(|(kind, count)| format!("{} {kind}", grouped(*count as u64)))
+            .collect();
+        let (smallest, largest) = mesh.cell_volume;
+        line(
+            "cells",
+            format!(
+                "{}; volume {smallest:.3e} to {largest:.3e} m^3, shortest edge {:.3e} m",
+                cells.join(", "),
+                mesh.shortest_edge
+            ),
+        );
+        for note in &mesh.notes {
+            line("mesh", note.clone());
+        }
+    }
     let (least, mean, most) = plan.neighbours;
     line(
         "neighbours",
@@ -24,6 +43,20 @@ pub fn report(simulation: &Simulation) -> String {
             grouped(plan.pairs as u64)
         ),
     );
+    if let Some(repair) = &plan.repair {
+        line(
+            "repair",
+            format!(
+                "pseudo-areas changed by {:.1} %, open by {:.1e} of an area before and {:.1e} after, \
+                 {} iterations in {:.2} s",
+                100.0 * repair.size,
+                repair.before,
+                repair.after,
+                repair.iterations,
+                repair.time.as_secs_f64()
+            ),
+        );
+    }
     line("memory", memory(plan.memory, plan.particles));
     line(
         "stable step",

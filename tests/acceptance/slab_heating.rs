@@ -1,0 +1,150 @@
+//! A slab heated by a flux, or cooled by convection, on one side: exact series.
+
+use std::f64::consts::PI;
+
+use urlsph::Field;
+
+use crate::support::*;
+
+/// Diffusivity of the scene [m^2/s]; the slab is 1 m thick.
+const DIFFUSIVITY: f64 = 20.0;
+const CONDUCTIVITY: f64 = 20_000.0;
+const FLUX: f64 = 2e6;
+const COLD: f64 = 293.15;
+const HOT: f64 = 393.15;
+
+/// (theta - theta_0) h/(q_0 L) at xi = x/L, tau = h t/(c_v L^2) of a slab that is heated at xi = 0
+/// and insulated at xi = 1.
+fn heated(xi: f64, tau: f64) -> f64 {
+    let term = |n: f64| (-(n * PI).powi(2) * tau).exp() * (n * PI * xi).cos() / (n * n);
+    let sum: f64 = (1..100).map(|n| term(f64::from(n))).sum();
+    tau + (3.0 * (1.0 - xi).powi(2) - 1.0) / 6.0 - 2.0 / PI.powi(2) * sum
+}
+
+/// (theta - theta_ambient)/(theta_0 - theta_ambient) of a slab that loses heat at xi = 0: separation of
+/// variables leaves cos(zeta (1 - xi)) with zeta tan zeta = Bi, one root in each (n pi, n pi + pi/2), and
+/// a uniform start has the coefficients 4 sin zeta/(2 zeta + sin 2 zeta).
+fn cooled(zetas: &[f64], xi: f64, tau: f64) -> f64 {
+    let term = |z: &f64| {
+        let coefficient = 4.0 * z.sin() / (2.0 * z + (2.0 * z).sin());
+        coefficient * (-z * z * tau).exp() * (z * (1.0 - xi)).cos()
+    };
+    zetas.iter().map(term).sum()
+}
+
+fn roots(biot: f64) -> Vec<f64> {
+    let root = |n: i32| {
+        let (mut low, mut high) = (f64::from(n) * PI, (f64::from(n) + 0.5) * PI);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if middle * middle.tan() < biot {
+                &mut low
+            } else {
+                &mut high
+            }) = middle;
+        }
+        0.5 * (low + high)
+    };
+    (0..50).map(root).collect()
+}
+
+/// Largest errors over the slab at times tau, each over the exact value at the surface (xi = 0) then.
+fn errors(
+    cells: u32,
+    overrides: &[&str],
+    taus: &[f64],
+    exact: impl Fn(f64, f64) -> f64,
+) -> Vec<f64> {
+    let spacing = 1.0 / f64::from(cells);
+    let lattice = format!(
+        "geometry.box={{\"min\": [0, 0, 0], \"max\": [1, {spacing}, {spacing}], \"spacing\": {spacing}}}"
+    );
+    let mut all = vec![lattice.as_str()];
+    all.extend_from_slice(overrides);
+    let mut simulation = simulation("slab_heating", &all);
+    let positions = field(&simulation, Field::InitialPosition);
+    taus.iter()
+        .map(|tau| {
+            simulation.advance(tau / DIFFUSIVITY).expect("stable");
+            let temperatures = field(&simulation, Field::Temperature);
+            let errors = std::iter::zip(positions.chunks_exact(3), temperatures)
+                .map(|(x, theta)| (theta - exact(x[0], *tau)).abs());
+            errors.fold(0.0, f64::max)
+        })
+        .collect()
+}
+
+const TAUS: [f64; 4] = [0.05, 0.1, 0.2, 0.5];
+
+/// Errors with 41 particles over `scale(tau)` below a tolerance, and second order from 21.
+fn second_order(
+    what: &str,
+    overrides: &[&str],
+    exact: impl Fn(f64, f64) -> f64,
+    scale: impl Fn(f64) -> f64,
+    tolerance: f64,
+) {
+    let coarse = errors(20, overrides, &TAUS, &exact);
+    let fine = errors(40, overrides, &TAUS, &exact);
+    for (i, tau) in TAUS.into_iter().enumerate() {
+        let what = format!("slab {what} tau = {tau}");
+        check(&what, fine[i] / scale(tau), tolerance);
+        let order = order((2.0, coarse[i]), (1.0, fine[i]));
+        check_at_least(&format!("{what}, order"), order, 1.9);
+    }
+}
+
+/// Within 1 % of the surface's rise of temperature, 63 K at tau = 0.05 and 208 K at 0.5.
+#[test]
+fn heat_flux() {
+    let scale = FLUX / CONDUCTIVITY;
+    for neighbours in ["6", "18"] {
+        let set = format!("numerics.neighbours={neighbours}");
+        let exact = |xi, tau| COLD + scale * heated(xi, tau);
+        let rise = |tau| scale * heated(0.0, tau);
+        let what = format!("heated, {neighbours} neighbours,");
+        second_order(&what, &[&set], exact, rise, 0.01);
+    }
+}
+
+#[test]
+fn convection() {
+    for biot in [0.5, 5.0, 50.0] {
+        let condition = format!(
+            "boundary.x_min={{\"convection\": {{\"coefficient\": {}, \"ambient_temperature\": {COLD}}}}}",
+            biot * CONDUCTIVITY
+        );
+        let start = format!("initial.temperature={HOT}");
+        let zetas = roots(biot);
+        let exact = |xi, tau| COLD + (HOT - COLD) * cooled(&zetas, xi, tau);
+        let what = format!("cooled, Bi = {biot},");
+        second_order(&what, &[&condition, &start], exact, |_| HOT - COLD, 0.002);
+    }
+}
+
+/// Convection that settles the step itself, with a coefficient a thousand times the conductance of a cell.
+#[test]
+fn convection_of_any_strength_is_stable() {
+    let condition = format!(
+        "boundary.x_min={{\"convection\": {{\"coefficient\": {}, \"ambient_temperature\": {COLD}}}}}",
+        2e4 * CONDUCTIVITY
+    );
+    let mut simulation = simulation(
+        "slab_heating",
+        &[
+            &condition,
+            "initial.temperature=393.15",
+            "geometry.box.spacing=0.05",
+            "geometry.box.max=[1, 0.05, 0.05]",
+        ],
+    );
+    simulation.advance(1e-4).expect("stable");
+    let temperatures = field(&simulation, Field::Temperature);
+    let [least, most] = [f64::min, f64::max].map(|f| temperatures.iter().copied().fold(350.0, f));
+    check(
+        "slab, strong convection: below the surroundings",
+        COLD - least,
+        1e-9,
+    );
+    check("slab, strong convection: above the start", most - HOT, 1e-9);
+}
