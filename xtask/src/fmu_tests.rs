@@ -8,6 +8,15 @@ use xshell::{Shell, cmd};
 use crate::tally::Tally;
 use crate::{project, venv};
 
+/// `cargo xtask fmu-tests`: these alone.
+pub fn run(sh: &Shell) -> Result<()> {
+    let tally = fmu_tests(sh)?;
+    println!("{} passed, {} failed", tally.passed, tally.failed);
+    ensure!(tally.failed == 0, "the tests of the FMUs failed");
+    Ok(())
+}
+
+/// Runs all of them.
 pub fn fmu_tests(sh: &Shell) -> Result<Tally> {
     let python = venv::python(sh)?;
     let urlsph = project::build(sh)?.join("urlsph");
