@@ -387,7 +387,7 @@ fn everything() -> Value {
             "gruneisen_exponent": 0.5, "plastic_heat_fraction": 0.9, "source": "1e3*sin(t)"
         },
         "body_force": [0, "-9.81*1100", 0],
-        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "temperature": "300 - X"},
+        "initial": {"velocity": ["X", 0, 0], "displacement": [0, "1e-3*Y", 0], "gradient": "exact", "temperature": "300 - X"},
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
@@ -559,6 +559,8 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.reference_update=always", P, "numerics.reference_update", &["`never`, `every_step`, `every`"]),
         ("numerics.reference_update=every", P, "numerics.reference_update.every", &["needs a value"]),
         ("numerics.reference_update=3", P, "numerics.reference_update", &["one of `never`"]),
+        ("initial.gradient=exact", S, "initial.gradient", &["no initial displacement"]),
+        ("initial.gradient=analytic", P, "initial.gradient", &["`discrete` or `exact`"]),
         // Wrong shapes.
         ("time=[3]", P, "time", &["a list, expected an object", "`end`"]),
         ("time.end=soon", P, "time.end", &["expected a number"]),
