@@ -14,6 +14,12 @@
 //! particle leaves as soon as its forces let it: impulses only push. What a particle loses when it
 //! is stopped is dissipated; it is the impact energy of a layer half a spacing thick and vanishes
 //! with the spacing.
+//!
+//! Tried instead on a bar of 20 cells that bounces (restitution .933 with the above, in one
+//! dimension), at the default CFL number: stopping particles after the step only takes nearly all of
+//! the energy (.014; and moving them back onto the plane breaks F = grad_0 x by .2); an acoustic
+//! traction max(0, -sigma - rho c v) is as good (.929) but sinks in by .005 spacings, for good; a
+//! penalty of stiffness rho c^2/h sinks in by .010 spacings, and of four times that gains 8 % energy.
 
 use super::Boundary;
 use crate::error::{Error, Result};
