@@ -10,6 +10,7 @@
 //! | particles, tributary volumes, patches | | `particles` |
 //! | neighbours | | `neighbours` |
 //! | kernel, corrected gradients, pseudo-areas, the four options | 37-52, 58 | `kernel`, `reference` |
+//! | closure of the pseudo-areas on irregular particles | | `reference::repair` |
 //! | neo-Hookean and Mooney-Rivlin laws | 5-8 | `material` |
 //! | Hencky's elasticity and the radial return of plastic flow | remark 3; [URL23] 31-40 | `material::hencky` |
 //! | von Mises and Johnson-Cook yield stresses | tables 3, 4; [URL23] 41, 42 | `material::von_mises`, `material::johnson_cook` |
@@ -66,6 +67,7 @@ pub use fields::{Configuration, FIELDS, Field, FieldInfo};
 pub use ledger::{ContactResultant, Energies, HeatResultant, Momenta, Resultant};
 pub use particles::MeshSummary;
 pub use plan::Plan;
+pub use reference::Repair;
 pub use scene::Scene;
 pub use simulation::{Control, ProbeMotion, Progress, Simulation, View};
 pub use snapshot::Snapshot;

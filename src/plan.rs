@@ -1,8 +1,9 @@
 //! What a scene will cost and which physics it switches on, for `urlsph check`.
 
 use crate::particles::MeshSummary;
+use crate::reference::Repair;
 use crate::scene::{
-    Limiter, Neighbours, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights,
+    Limiter, Neighbours, Operators, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights,
 };
 
 /// What a scene will cost.
@@ -22,6 +23,8 @@ pub struct Plan {
     pub steps: u64,
     /// Memory of the simulation [bytes].
     pub memory: usize,
+    /// What the repair of the operators took and left, where they are repaired.
+    pub repair: Option<Repair>,
     /// Physics and options that are on, one line each.
     pub on: Vec<String>,
     /// Physics and options that are off, one line each.
@@ -29,7 +32,7 @@ pub struct Plan {
 }
 
 /// Physics and options that a scene has on and off.
-pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
+pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec<String>) {
     let n = &scene.numerics;
     let mut on = vec![match &scene.material {
         crate::scene::Material::NeoHookean(_) => "neo-Hookean elasticity".to_string(),
@@ -46,9 +49,16 @@ pub(crate) fn features(scene: &Scene) -> (Vec<String>, Vec<String>) {
         Neighbours::Lattice(count) => format!("{count} lattice neighbours"),
         Neighbours::Radius { radius } => format!("neighbours within {radius} spacings"),
     });
-    on.push(match n.weights {
-        Weights::Unit => "unit kernel weights".to_string(),
-        Weights::Tributary => "tributary kernel weights".to_string(),
+    on.push(match (operators, n.weights) {
+        (Operators::Kernel, Weights::Unit) => "operators of the kernel, unit weights".to_string(),
+        (Operators::Kernel, Weights::Tributary) => {
+            "operators of the kernel, tributary weights".to_string()
+        }
+        (Operators::Repaired, _) if n.redoes_the_repair() => {
+            "operators of the kernel, repaired at every update".to_string()
+        }
+        (Operators::Repaired, _) => "operators of the kernel, repaired".to_string(),
+        (Operators::Mesh, _) => "operators of the mesh".to_string(),
     });
     let mut off = Vec::new();
     let mut feature = |is_on: bool, name: String| {

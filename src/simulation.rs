@@ -247,7 +247,7 @@ impl Simulation {
     pub fn plan(&self) -> Plan {
         let (fewest, most) = self.reference.neighbour_range;
         let dt = self.stable_step();
-        let (on, off) = crate::plan::features(&self.scene);
+        let (on, off) = crate::plan::features(&self.scene, self.reference.operators);
         Plan {
             particles: self.particle_count(),
             pairs: self.pair_count(),
@@ -260,6 +260,7 @@ impl Simulation {
             stable_step: dt,
             steps: (self.scene.time.end / dt).ceil() as u64,
             memory: self.memory(),
+            repair: self.reference.repair().copied(),
             on,
             off,
         }

@@ -127,11 +127,13 @@ impl Snapshot {
                 f_chi: Array::new(layout, flat(&IDENTITY)),
                 j_chi: Array::new(layout, [1.0]),
                 h_chi: None,
+                half_mu: None,
             });
             walk.array(&mut u.chi)?;
             walk.array(&mut u.f_chi)?;
             walk.array(&mut u.j_chi)?;
             walk.optional(&mut u.h_chi, (layout, flat(&IDENTITY)))?;
+            walk.optional(&mut u.half_mu, (layout, [0.0; 3]))?;
         }
         Ok(())
     }

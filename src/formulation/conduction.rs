@@ -137,7 +137,7 @@ impl<P: PairVectors> Work for Jumps<'_, P> {
             let mut entropy = T::splat(token, 0.0);
             let (mut length2, mut areas) = (far, tiny);
             for (b, pair) in slices.of(a) {
-                let (g, back) = pairs.pair(centre, b, pair);
+                let (g, back) = pairs.pair(token, &centre, b, pair);
                 let dx = sub3(input.position(token, b), xa);
                 let dx2 = dot(dx, dx);
                 let mask = T::load(token, weights, pair);
@@ -196,7 +196,7 @@ impl<P: PairVectors> Work for Divergence<'_, P> {
             let flux_a = load3::<T>(token, &self.flux, a);
             let mut heat = T::load(token, self.heat, at);
             for (b, pair) in self.input.reference.slices.of(a) {
-                let (g, back) = self.pairs.pair(centre, b, pair);
+                let (g, back) = self.pairs.pair(token, &centre, b, pair);
                 heat = heat - (dot(flux_a, g) - dot(load3(token, &self.flux, b), back));
             }
             heat.store(self.heat, at);

@@ -108,7 +108,7 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
             let own = load3::<T>(token, &self.field, a);
             let mut sum = [zero3(token); 3];
             for (b, pair) in self.reference.slices.of(a) {
-                let (g, _) = self.pairs.pair(centre, b, pair);
+                let (g, _) = self.pairs.pair(token, &centre, b, pair);
                 sum = add_outer(&sum, sub3(load3(token, &self.field, b), own), g);
             }
             store9(&mat_mul_t(&sum, &load9(token, &l, a)), self.out, at);
@@ -543,6 +543,8 @@ pub(super) struct Forces<'a, P, const MODE: u8> {
     pub speeds: WaveSpeeds<f64>,
     /// Share of the dissipation in resolved flow.
     pub coefficient: f64,
+    /// rho_R [kg/m^3].
+    pub density: f64,
     pub slab: usize,
     pub out: [&'a mut [f64]; 3],
 }
@@ -556,11 +558,12 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             input,
             speeds,
             coefficient,
+            density,
             slab,
             mut out,
         } = self;
         let slices = &input.reference.slices;
-        let weights = slices.weights();
+        let (weights, volume) = (slices.weights(), input.reference.volume.components()[0]);
         let speeds = WaveSpeeds {
             pressure: T::splat(token, coefficient * speeds.pressure),
             shear: T::splat(token, coefficient * speeds.shear),
@@ -573,23 +576,28 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             let centre = pairs.centre::<T>(token, a);
             let qa = load9::<T>(token, &input.q, a);
             let (mut sa, mut grad_a) = ([zero3(token); 3], [zero3(token); 3]);
-            if MODE != riemann::OFF {
+            if MODE != riemann::OFF || P::BOUND_BY_AREAS {
                 sa = load9::<T>(token, &input.s, a);
             }
             if riemann::reconstructs(MODE) {
                 grad_a = load9::<T>(token, &input.half_grad, a);
             }
             let mut force = zero3::<T>(token);
-            let mut work = T::splat(token, 0.0);
+            let (mut work, mut areas) = (T::splat(token, 0.0), T::splat(token, 0.0));
             let mut length2 = far;
             for (b, pair) in slices.of(a) {
-                let (g, back) = pairs.pair(centre, b, pair);
+                let (g, back) = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
                 let mask = T::load(token, weights, pair);
                 length2 = length2.min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
                 let mut f = sub3(mat_vec(&qa, g), mat_vec(&load9(token, &input.q, b), back));
-                if MODE != riemann::OFF {
+                if MODE != riemann::OFF || P::BOUND_BY_AREAS {
                     p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(token, &input.s, b), back));
+                }
+                if P::BOUND_BY_AREAS {
+                    areas = areas + dot(p.area, p.area).sqrt();
+                }
+                if MODE != riemann::OFF {
                     let grad_b = if riemann::reconstructs(MODE) {
                         load9(token, &input.half_grad, b)
                     } else {
@@ -604,6 +612,13 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             }
             store3(&force, &mut out, at);
             power.add(at, work);
+            if P::BOUND_BY_AREAS {
+                // 5 lambda / kappa, kappa = sum |c_ab| / (J V_R): a particle with little volume and
+                // large areas, which irregular ones have, binds the step by more than its distances.
+                let mass = T::splat(token, density) * T::load(token, volume, a);
+                let bound = T::splat(token, 5.0) * here.stretch * mass / (here.density * areas);
+                length2 = areas.if_positive(length2.min(bound * bound), length2);
+            }
             shortest.min(at, length2);
         }
         // Each pair is seen from both sides.
@@ -631,7 +646,7 @@ impl<P: PairVectors> Work for HalfSlope<'_, P> {
             let own = T::load(token, self.field, a);
             let mut sum = zero3(token);
             for (b, pair) in self.reference.slices.of(a) {
-                let (g, _) = self.pairs.pair(centre, b, pair);
+                let (g, _) = self.pairs.pair(token, &centre, b, pair);
                 sum = axpy3(sum, T::load(token, self.field, b) - own, g);
             }
             let f = load9::<T>(token, &self.kinematics.f, a);
@@ -677,7 +692,7 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
             );
             let (mut rate, mut work) = (T::splat(token, 0.0), T::splat(token, 0.0));
             for (b, pair) in input.reference.slices.of(a) {
-                let (g, back) = pairs.pair(centre, b, pair);
+                let (g, back) = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
                 p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(token, &input.s, b), back));
                 let difference = T::load(token, self.sigma, b) - sigma_a;

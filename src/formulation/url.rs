@@ -213,7 +213,8 @@ impl Url {
         };
         let volume = numerics.volume_dissipation > 0.0;
         let conduction = thermal.filter(|t| t.conductivity > 0.0);
-        let areas = mode != riemann::OFF || volume || conduction.is_some();
+        let bound = reference.is_bound_by_areas();
+        let areas = mode != riemann::OFF || volume || bound || conduction.is_some();
         Self {
             law,
             options: Options {
@@ -521,7 +522,7 @@ impl Url {
 
     /// Force pass; power of the dissipation and squared length by slab.
     fn forces<R: Runner>(&mut self, state: &State, reference: &Reference) -> Vec<(f64, f64)> {
-        let speeds = self.wave_speeds();
+        let (speeds, density) = (self.wave_speeds(), self.law.density());
         let Self {
             options,
             scratch,
@@ -535,7 +536,7 @@ impl Url {
                 ($pairs:expr, $($mode:ident),*) => {
                     match options.mode {
                         $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
-                            pairs: $pairs, input, speeds, coefficient, slab, out,
+                            pairs: $pairs, input, speeds, coefficient, density, slab, out,
                         }),)*
                         _ => unreachable!("five modes"),
                     }
@@ -696,7 +697,7 @@ impl Url {
         }
         new.chi.copy_from(&state.x);
         reference.updated = Some(new);
-        if let Err(slot) = reference.rebuild() {
+        if let Err(slot) = reference.update() {
             reference.updated = Some(old);
             reference.rebuild().expect("it could be built before");
             let ratio = self.deformation(state, reference, slot).j;
@@ -894,6 +895,13 @@ mod tests {
                 "numerics.kernel_option=4",
                 "numerics.reference_update=every_step",
                 "numerics.weights=tributary",
+            ],
+            &["numerics.operators=repaired"],
+            &["numerics.operators=repaired", "numerics.dissipation=false"],
+            &[
+                "numerics.operators=repaired",
+                "numerics.kernel_option=4",
+                "numerics.reference_update=every_step",
             ],
             &["numerics.state=fj", "numerics.volume_dissipation=0.1"],
             &[

@@ -32,7 +32,8 @@ pub use geometry::{
 pub use heat::Heat;
 pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
-    Limiter, Neighbours, Numerics, Reconstruction, ReferenceUpdate, StateMeasures, Weights,
+    Limiter, Neighbours, Numerics, Operators, Reconstruction, ReferenceUpdate, StateMeasures,
+    Weights,
 };
 pub use schema::json_schema;
 pub use value::{Interpolation, Scalar, ScalarFunction, Table, Vector, VectorFunction};

@@ -15,6 +15,10 @@ use crate::error::Result;
 pub struct Numerics {
     /// Neighbours of a particle.
     pub neighbours: Neighbours,
+    /// What gradients and forces are made of; default `kernel` where the particles form a lattice,
+    /// or where `weights` are `tributary`, and `repaired` elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operators: Option<Operators>,
     /// Weights inside the kernel gradient.
     pub weights: Weights,
     /// Smoothing factor f_h: h_b = f_h x largest distance to a neighbour ([URL22] 37).
@@ -53,6 +57,7 @@ impl Default for Numerics {
     fn default() -> Self {
         Self {
             neighbours: Neighbours::Lattice(18),
+            operators: None,
             weights: Weights::Unit,
             smoothing_factor: 0.6,
             kernel_option: 1,
@@ -71,6 +76,11 @@ impl Default for Numerics {
 }
 
 impl Numerics {
+    /// Whether an update recomputes the kernels, and with them the repair of the operators.
+    pub(crate) fn redoes_the_repair(&self) -> bool {
+        self.kernel_option >= 3 && self.reference_update != ReferenceUpdate::Never
+    }
+
     /// The CFL number: the scene's, or the one that is proven stable for the largest number of
     /// neighbours of a particle.
     pub fn cfl_number(&self, neighbours: usize) -> f64 {
@@ -91,6 +101,19 @@ pub enum Neighbours {
         /// Radius over spacing.
         radius: f64,
     },
+}
+
+/// What gradients and forces are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Operators {
+    /// Corrected kernel gradients ([URL22] 42, 58): closed on a lattice.
+    Kernel,
+    /// Corrected kernel gradients with the smallest change that makes a uniform stress force-free on
+    /// any particles.
+    Repaired,
+    /// Gradients of the shape functions of the mesh: exact too, without a kernel.
+    Mesh,
 }
 
 /// Weights inside the kernel gradient.
@@ -197,6 +220,17 @@ pub(super) fn validate(n: &Numerics) -> Result<()> {
             ),
         )?,
     }
+    require(
+        n.weights == Weights::Unit || matches!(n.operators, None | Some(Operators::Kernel)),
+        "numerics.weights",
+        "tributary weights belong to the operators `kernel`",
+    )?;
+    require(
+        n.operators != Some(Operators::Mesh) || !n.redoes_the_repair(),
+        "numerics.kernel_option",
+        "options 3 and 4 recompute kernels, and the operators `mesh` have none: set 1 or 2, or the \
+         operators `repaired`",
+    )?;
     require(
         n.smoothing_factor > 0.5 && n.smoothing_factor <= 2.0,
         "numerics.smoothing_factor",

@@ -4,6 +4,8 @@ use urlsph::{Simulation, Snapshot};
 
 use crate::support::*;
 
+const JITTERED: &[&str] = &["geometry.box.jitter={\"fraction\": 0.2}"];
+
 /// Scenes and options that take different paths through the solver.
 const VARIANTS: &[(&str, &[&str])] = &[
     ("column_bending", &[]),
@@ -61,6 +63,25 @@ const VARIANTS: &[(&str, &[&str])] = &[
     (
         "column_tension",
         &["numerics.reconstruction=none", "numerics.neighbours=6"],
+    ),
+    ("column_twisting", JITTERED),
+    (
+        "column_twisting",
+        &[
+            JITTERED[0],
+            "numerics.kernel_option=4",
+            "numerics.reference_update={\"every\": 2}",
+            "numerics.angular_momentum_projection=true",
+        ],
+    ),
+    (
+        "column_bending",
+        &[
+            JITTERED[0],
+            "numerics.operators=mesh",
+            "numerics.neighbours=26",
+            "numerics.dissipation=false",
+        ],
     ),
     ("l_block", &[]),
     ("elastic_cube", &["numerics.neighbours={\"radius\": 2.1}"]),

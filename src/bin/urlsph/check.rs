@@ -43,6 +43,20 @@ pub fn report(simulation: &Simulation) -> String {
             grouped(plan.pairs as u64)
         ),
     );
+    if let Some(repair) = &plan.repair {
+        line(
+            "repair",
+            format!(
+                "pseudo-areas changed by {:.1} %, open by {:.1e} of an area before and {:.1e} after, \
+                 {} iterations in {:.2} s",
+                100.0 * repair.size,
+                repair.before,
+                repair.after,
+                repair.iterations,
+                repair.time.as_secs_f64()
+            ),
+        );
+    }
     line("memory", memory(plan.memory, plan.particles));
     line(
         "stable step",
