@@ -12,8 +12,8 @@
 
 #include "check.h"
 
-/* The scene's file, the first argument of the program. */
-static const char *scene_path;
+/* The files of the scenes, the arguments of the program: a column, and a metal with heat. */
+static const char *scene_path, *metal_path;
 
 static const double nan_ = NAN;
 static const double inf_ = INFINITY;
@@ -25,18 +25,22 @@ static const double inf_ = INFINITY;
         unsigned char later[16]; \
     }
 
-static urlsph_simulation *create(const char *override, size_t threads) {
+static urlsph_simulation *create_from(const char *path, const char *override, size_t threads) {
     urlsph_options options = {0};
     options.overrides = override ? &override : NULL;
     options.override_count = override ? 1 : 0;
     options.threads = threads;
     urlsph_simulation *s = NULL;
     urlsph_error error;
-    if (urlsph_create_from_file(scene_path, &options, sizeof options, &s, &error, sizeof error) !=
+    if (urlsph_create_from_file(path, &options, sizeof options, &s, &error, sizeof error) !=
         URLSPH_OK) {
         printf("    %s\n", error.text);
     }
     return s;
+}
+
+static urlsph_simulation *create(const char *override, size_t threads) {
+    return create_from(scene_path, override, threads);
 }
 
 static uint64_t hash(const urlsph_simulation *s) {
@@ -196,6 +200,7 @@ static bool all_give(urlsph_simulation *s, urlsph_status wanted) {
     urlsph_momenta momenta;
     urlsph_patch_info patch_info;
     urlsph_resultant resultant;
+    urlsph_heat_resultant heat_resultant;
     urlsph_field_info field_info;
     urlsph_view view;
     urlsph_probe_info probe_info;
@@ -238,6 +243,10 @@ static bool all_give(urlsph_simulation *s, urlsph_status wanted) {
         GIVES(urlsph_set_traction(s, 0, values, 3));
         GIVES(urlsph_set_pressure(s, 0, values, 1));
         GIVES(urlsph_set_velocity(s, 0, values, 3));
+        GIVES(urlsph_set_heat_flux(s, 0, values, 1));
+        GIVES(urlsph_set_temperature(s, 0, values, 1));
+        GIVES(urlsph_set_convection(s, 0, values, 1, values, 1));
+        GIVES(urlsph_get_heat_resultant(s, 0, &heat_resultant, sizeof heat_resultant));
         GIVES(urlsph_read_input(s, 0, URLSPH_TRACTION, d, 1024, &n));
         GIVES(urlsph_step(s, 1e-5));
         GIVES(urlsph_advance_to(s, 1.0));
@@ -334,13 +343,14 @@ static void null_outputs(void) {
 static void struct_sizes(void) {
     urlsph_simulation *s = create(NULL, 1);
     CHECK(s);
-#define SIZES(call, type)                                                       \
+/* `first` is the size in the first version: less is refused, more is zeroed beyond what we know. */
+#define SIZES_SINCE(call, type, first)                                          \
     do {                                                                        \
         LATER(type) v;                                                          \
         memset(&v, 0xaa, sizeof v);                                             \
         INVALID(call(&v.now, 0));                                               \
         INVALID(call(&v.now, 1));                                               \
-        INVALID(call(&v.now, sizeof v.now - sizeof(int64_t)));                  \
+        INVALID(call(&v.now, (first) - sizeof(int64_t)));                       \
         unsigned char *raw = (unsigned char *)&v;                               \
         for (size_t i = 0; i < sizeof v; ++i) CHECK(raw[i] == 0xaa);            \
         CHECK(call(&v.now, sizeof v) == URLSPH_OK);                             \
@@ -348,7 +358,11 @@ static void struct_sizes(void) {
         memset(&v, 0xaa, sizeof v);                                             \
         CHECK(call(&v.now, sizeof v.now) == URLSPH_OK);                         \
         for (size_t i = 0; i < sizeof v.later; ++i) CHECK(v.later[i] == 0xaa);  \
+        memset(&v, 0xaa, sizeof v);                                             \
+        CHECK(call(&v.now, first) == URLSPH_OK);                                \
+        for (size_t i = first; i < sizeof v; ++i) CHECK(raw[i] == 0xaa);        \
     } while (0)
+#define SIZES(call, type) SIZES_SINCE(call, type, sizeof(type))
 #define COUNTS(p, n) urlsph_get_counts(s, p, n)
 #define ENERGIES(p, n) urlsph_get_energies(s, p, n)
 #define MOMENTA(p, n) urlsph_get_momenta(s, p, n)
@@ -360,15 +374,21 @@ static void struct_sizes(void) {
 #define MOTION(p, n) urlsph_get_probe_motion(s, 0, p, n)
 #define INPUT_INFO(p, n) urlsph_get_input_info(s, 0, p, n)
     SIZES(COUNTS, urlsph_counts);
-    SIZES(ENERGIES, urlsph_energies);
+    SIZES_SINCE(ENERGIES, urlsph_energies, offsetof(urlsph_energies, thermal));
     SIZES(MOMENTA, urlsph_momenta);
     SIZES(PATCH_INFO, urlsph_patch_info);
     SIZES(RESULTANT, urlsph_resultant);
-    SIZES(FIELD_INFO, urlsph_field_info);
+    SIZES_SINCE(FIELD_INFO, urlsph_field_info, offsetof(urlsph_field_info, is_present));
     SIZES(VIEW, urlsph_view);
     SIZES(PROBE_INFO, urlsph_probe_info);
-    SIZES(MOTION, urlsph_probe_motion);
+    SIZES_SINCE(MOTION, urlsph_probe_motion, offsetof(urlsph_probe_motion, temperature));
     SIZES(INPUT_INFO, urlsph_input_info);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+    s = create_from(metal_path, NULL, 1);
+    CHECK(s);
+#define HEAT_RESULTANT(p, n) urlsph_get_heat_resultant(s, 0, p, n)
+    SIZES(HEAT_RESULTANT, urlsph_heat_resultant);
+    INVALID(urlsph_get_heat_resultant(s, 0, NULL, sizeof(urlsph_heat_resultant)));
     CHECK(urlsph_destroy(s) == URLSPH_OK);
 }
 
@@ -438,7 +458,7 @@ static void fields(void) {
     CHECK(urlsph_get_counts(s, &counts, sizeof counts) == URLSPH_OK);
     double *values = malloc((9 * counts.particles + 1) * sizeof *values);
     CHECK(values);
-    size_t views = 0;
+    size_t views = 0, absent = 0;
     for (size_t f = 0; f < counts.fields; ++f) {
         urlsph_field_info info;
         CHECK(urlsph_get_field_info(s, f, &info, sizeof info) == URLSPH_OK);
@@ -450,6 +470,13 @@ static void fields(void) {
         CHECK(urlsph_find_field(s, info.name, &found) == URLSPH_OK && found == f);
 
         const size_t needed = counts.particles * info.components;
+        if (!info.is_present) {
+            values[0] = 77.0;
+            INVALID(urlsph_read_field(s, f, values, needed));
+            CHECK(strcmp(last(s).field, info.name) == 0 && values[0] == 77.0);
+            ++absent;
+            continue;
+        }
         INVALID(urlsph_read_field(s, f, values, needed - 1));
         INVALID(urlsph_read_field(s, f, values, 0));
         values[needed] = 77.0;
@@ -477,7 +504,9 @@ static void fields(void) {
         CHECK(urlsph_get_generation(s, &generation) == URLSPH_OK);
         CHECK(generation == view.generation);
     }
-    CHECK(views >= 3);
+    CHECK(views >= 3 && absent == 3);
+    INVALID(urlsph_read_field(s, field(s, "temperature"), values, counts.particles));
+    CHECK(strstr(last(s).text, "`heat`"));
     uint64_t before, after;
     CHECK(urlsph_get_generation(s, &before) == URLSPH_OK);
     CHECK(urlsph_step(s, 1e-5) == URLSPH_OK);
@@ -490,7 +519,7 @@ static void fields(void) {
     INVALID(urlsph_get_field_info(s, counts.fields, &info, sizeof info));
     INVALID(urlsph_read_field(s, SIZE_MAX, values, 9 * counts.particles));
     INVALID(urlsph_get_view(s, counts.fields, &view, sizeof view));
-    INVALID(urlsph_find_field(s, "temperature", &n));
+    INVALID(urlsph_find_field(s, "colour", &n));
     CHECK(strstr(last(s).text, "cauchy_stress"));
     free(values);
     CHECK(urlsph_destroy(s) == URLSPH_OK);
@@ -499,7 +528,7 @@ static void fields(void) {
 static void inputs(void) {
     urlsph_simulation *s = create(NULL, 2);
     CHECK(s);
-    bool seen[4] = {false};
+    bool seen[8] = {false};
     for (size_t i = 0; i < 3; ++i) {
         urlsph_input_info info;
         CHECK(urlsph_get_input_info(s, i, &info, sizeof info) == URLSPH_OK);
@@ -552,6 +581,196 @@ static void inputs(void) {
     INVALID(urlsph_read_input(s, top, -7, back, 45, &count));
     INVALID(urlsph_read_input(s, SIZE_MAX, URLSPH_TRACTION, back, 45, &count));
     CHECK(hash(s) == before);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+/* Flux, temperature and convection: set, read back, refused. */
+static void heat_inputs(void) {
+    urlsph_simulation *s = create_from(metal_path, NULL, 2);
+    CHECK(s);
+    const size_t top = patch(s, "top"), side = patch(s, "side"), back = patch(s, "back");
+    const size_t bottom = patch(s, "bottom");
+    urlsph_counts counts;
+    CHECK(urlsph_get_counts(s, &counts, sizeof counts) == URLSPH_OK && counts.inputs == 6);
+    bool seen[8] = {false};
+    for (size_t i = 0; i < counts.inputs; ++i) {
+        urlsph_input_info info;
+        CHECK(urlsph_get_input_info(s, i, &info, sizeof info) == URLSPH_OK);
+        seen[info.quantity] = true;
+        CHECK(info.components == (info.quantity == URLSPH_TRACTION ? 3 : 1));
+    }
+    CHECK(seen[URLSPH_HEAT_FLUX] && seen[URLSPH_TEMPERATURE] && seen[URLSPH_AMBIENT_TEMPERATURE] &&
+          seen[URLSPH_CONVECTION_COEFFICIENT]);
+
+    double values[15], back_[15];
+    size_t count;
+    for (int i = 0; i < 15; ++i) values[i] = 300.0 + i;
+    CHECK(urlsph_set_heat_flux(s, top, values, 1) == URLSPH_OK);
+    CHECK(urlsph_set_heat_flux(s, top, values, 9) == URLSPH_OK);
+    CHECK(urlsph_read_input(s, top, URLSPH_HEAT_FLUX, back_, 15, &count) == URLSPH_OK);
+    CHECK(count == 9 && memcmp(back_, values, sizeof(double[9])) == 0);
+    CHECK(urlsph_set_temperature(s, bottom, values, 9) == URLSPH_OK);
+    CHECK(urlsph_set_temperature(s, bottom, values, 1) == URLSPH_OK);
+    CHECK(urlsph_set_convection(s, side, values, 1, values, 15) == URLSPH_OK);
+    CHECK(urlsph_set_convection(s, side, values + 1, 15 - 14, NULL, 0) == URLSPH_OK);
+    CHECK(urlsph_read_input(s, side, URLSPH_AMBIENT_TEMPERATURE, back_, 15, &count) == URLSPH_OK);
+    CHECK(count == 15 && memcmp(back_, values, sizeof values) == 0);
+    CHECK(urlsph_read_input(s, side, URLSPH_CONVECTION_COEFFICIENT, back_, 15, &count) ==
+          URLSPH_OK);
+    CHECK(count == 1 && back_[0] == 301.0);
+    /* The coefficient is the scene's here; the ambient temperature is ours. */
+    CHECK(urlsph_set_convection(s, back, NULL, 0, values + 9, 1) == URLSPH_OK);
+
+    const uint64_t before = hash(s);
+    const double cold = 0.0, negative = -1.0;
+    INVALID(urlsph_set_heat_flux(s, top, values, 2));
+    INVALID(urlsph_set_heat_flux(s, top, NULL, 0));
+    INVALID(urlsph_set_heat_flux(s, top, &nan_, 1));
+    INVALID(urlsph_set_heat_flux(s, bottom, values, 1));
+    CHECK(strstr(last(s).text, "heat_flux") && strcmp(last(s).boundary, "bottom") == 0);
+    INVALID(urlsph_set_heat_flux(s, SIZE_MAX, values, 1));
+    INVALID(urlsph_set_temperature(s, bottom, &cold, 1));
+    CHECK(strstr(last(s).text, "0 K"));
+    INVALID(urlsph_set_temperature(s, bottom, &inf_, 1));
+    INVALID(urlsph_set_temperature(s, top, values, 1));
+    INVALID(urlsph_set_temperature(s, bottom, values, 10));
+    INVALID(urlsph_set_convection(s, side, &negative, 1, values, 1));
+    INVALID(urlsph_set_convection(s, side, values, 1, &cold, 1));
+    INVALID(urlsph_set_convection(s, side, values, 1, values, 14));
+    INVALID(urlsph_set_convection(s, side, values, 0, values, 1));
+    INVALID(urlsph_set_convection(s, side, NULL, 1, values, 1));
+    INVALID(urlsph_set_convection(s, side, values, 1, NULL, 15));
+    INVALID(urlsph_set_convection(s, side, NULL, 0, NULL, 0));
+    INVALID(urlsph_set_convection(s, back, values, 1, values, 1));
+    INVALID(urlsph_set_convection(s, top, values, 1, values, 1));
+    INVALID(urlsph_set_convection(s, counts.patches, values, 1, values, 1));
+    CHECK(hash(s) == before);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+
+    /* A body without heat takes none. */
+    s = create(NULL, 1);
+    CHECK(s);
+    urlsph_heat_resultant r;
+    INVALID(urlsph_set_heat_flux(s, patch(s, "top"), values, 1));
+    INVALID(urlsph_set_temperature(s, patch(s, "top"), values, 1));
+    INVALID(urlsph_set_convection(s, patch(s, "top"), values, 1, values, 1));
+    INVALID(urlsph_get_heat_resultant(s, patch(s, "top"), &r, sizeof r));
+    CHECK(strstr(last(s).text, "`heat`") && strcmp(last(s).boundary, "top") == 0);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+/* What heat and plastic flow do: resultants, probes, fields, ledger. */
+static void heat_and_metal(void) {
+    urlsph_simulation *s = create_from(metal_path, NULL, 2);
+    CHECK(s);
+    const size_t top = patch(s, "top"), side = patch(s, "side"), bottom = patch(s, "bottom");
+    const double flux = 1e9, hot = 400.0, coefficient = 1e6, air = 600.0;
+    const double pull[3] = {0.0, 1.5e8, 0.0};
+    CHECK(urlsph_set_traction(s, top, pull, 3) == URLSPH_OK);
+    CHECK(urlsph_set_heat_flux(s, top, &flux, 1) == URLSPH_OK);
+    CHECK(urlsph_set_convection(s, side, &coefficient, 1, &air, 1) == URLSPH_OK);
+    CHECK(urlsph_set_temperature(s, bottom, &hot, 1) == URLSPH_OK);
+
+    /* At once: flux x area, and coefficient x difference x area of a body at 298 K. */
+    urlsph_heat_resultant r;
+    CHECK(urlsph_get_heat_resultant(s, top, &r, sizeof r) == URLSPH_OK);
+    CHECK_NEAR(r.heat_flow, 1e9 * 1e-6, 1e-9);
+    CHECK_NEAR(r.mean_temperature, 298.0, 1e-9);
+    CHECK_NEAR(r.maximum_temperature, 298.0, 1e-9);
+    CHECK(urlsph_get_heat_resultant(s, side, &r, sizeof r) == URLSPH_OK);
+    CHECK_NEAR(r.heat_flow, 1e6 * (600.0 - 298.0) * 2e-6, 1e-6);
+    INVALID(urlsph_get_heat_resultant(s, SIZE_MAX, &r, sizeof r));
+
+    CHECK(urlsph_step(s, 1e-6) == URLSPH_OK);
+    CHECK(urlsph_get_heat_resultant(s, bottom, &r, sizeof r) == URLSPH_OK);
+    CHECK_NEAR(r.mean_temperature, 400.0, 1e-9);
+    CHECK_NEAR(r.maximum_temperature, 400.0, 1e-9);
+    CHECK(urlsph_get_heat_resultant(s, top, &r, sizeof r) == URLSPH_OK);
+    CHECK(r.mean_temperature > 298.5 && r.maximum_temperature >= r.mean_temperature);
+
+    urlsph_probe_motion corner;
+    size_t probe;
+    double temperature[45], strain[45], entropy[45];
+    CHECK(urlsph_find_probe(s, "corner", &probe) == URLSPH_OK);
+    CHECK(urlsph_get_probe_motion(s, probe, &corner, sizeof corner) == URLSPH_OK);
+    CHECK(urlsph_read_field(s, field(s, "temperature"), temperature, 45) == URLSPH_OK);
+    CHECK(urlsph_read_field(s, field(s, "equivalent_plastic_strain"), strain, 45) == URLSPH_OK);
+    CHECK(urlsph_read_field(s, field(s, "entropy"), entropy, 45) == URLSPH_OK);
+    double most = 0.0, nearest = 1e9;
+    for (int i = 0; i < 45; ++i) {
+        CHECK(temperature[i] > 280.0 && temperature[i] < 700.0 && isfinite(entropy[i]));
+        CHECK(strain[i] >= 0.0);
+        most = fmax(most, strain[i]);
+        nearest = fmin(nearest, fabs(temperature[i] - corner.temperature));
+    }
+    printf("    largest plastic strain %.3e\n", most);
+    CHECK(most > 1e-4);
+    /* The corner is a particle. */
+    CHECK(nearest < 1e-9);
+
+    urlsph_energies e;
+    CHECK(urlsph_get_energies(s, &e, sizeof e) == URLSPH_OK);
+    CHECK(e.thermal > 0.0 && e.heat_in > 0.0 && e.plastic_work > 0.0);
+    CHECK(e.entropy > 0.0 && e.entropy_production > 0.0 && isfinite(e.ballistic));
+    printf("    closure error %.1e of the heat supplied, tolerance 1e-2\n",
+           fabs(e.closure_error) / e.heat_in);
+    CHECK_NEAR(e.closure_error, 0.0, 1e-2 * e.heat_in);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+
+    /* A body without heat has no temperature. */
+    s = create(NULL, 1);
+    CHECK(s && urlsph_find_probe(s, "corner", &probe) == URLSPH_OK);
+    CHECK(urlsph_get_probe_motion(s, probe, &corner, sizeof corner) == URLSPH_OK);
+    CHECK(corner.temperature == 0.0);
+    CHECK(urlsph_get_energies(s, &e, sizeof e) == URLSPH_OK);
+    CHECK(e.thermal == 0.0 && e.heat_in == 0.0 && e.plastic_work == 0.0 && e.entropy == 0.0);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
+/* A snapshot has temperatures, plastic strains and inputs for heat: the same bits from there on. */
+static void heat_snapshots(void) {
+    urlsph_simulation *s = create_from(metal_path, NULL, 2);
+    CHECK(s);
+    const size_t top = patch(s, "top"), side = patch(s, "side"), bottom = patch(s, "bottom");
+    const double pull[3] = {0.0, 1.5e8, 0.0}, push[3] = {0.0, -1.5e8, 1e8};
+    const double flux[9] = {1e9, 2e9, 3e9, 4e9, 5e9, 6e9, 7e9, 8e9, 9e9}, none = 0.0;
+    const double hot = 400.0, hotter = 500.0, coefficient = 1e6, air = 600.0;
+    CHECK(urlsph_set_traction(s, top, pull, 3) == URLSPH_OK);
+    CHECK(urlsph_set_heat_flux(s, top, flux, 9) == URLSPH_OK);
+    CHECK(urlsph_set_convection(s, side, &coefficient, 1, &air, 1) == URLSPH_OK);
+    CHECK(urlsph_set_temperature(s, bottom, &hot, 1) == URLSPH_OK);
+    CHECK(urlsph_step(s, 1e-6) == URLSPH_OK);
+    size_t size, written;
+    CHECK(urlsph_get_snapshot_size(s, &size) == URLSPH_OK);
+    uint8_t *bytes = malloc(size);
+    CHECK(bytes && urlsph_save_snapshot(s, bytes, size, &written) == URLSPH_OK);
+    const uint64_t saved = hash(s);
+    urlsph_energies then, now;
+    urlsph_heat_resultant flow, again;
+    CHECK(urlsph_step(s, 1e-6) == URLSPH_OK);
+    const uint64_t there = hash(s);
+    CHECK(urlsph_get_energies(s, &then, sizeof then) == URLSPH_OK);
+    CHECK(urlsph_get_heat_resultant(s, side, &flow, sizeof flow) == URLSPH_OK);
+
+    /* Away with other loads and other heat, and back; and into a twin with other threads. */
+    CHECK(urlsph_set_traction(s, top, push, 3) == URLSPH_OK);
+    CHECK(urlsph_set_heat_flux(s, top, &none, 1) == URLSPH_OK);
+    CHECK(urlsph_set_temperature(s, bottom, &hotter, 1) == URLSPH_OK);
+    CHECK(urlsph_set_convection(s, side, &none, 1, &hot, 1) == URLSPH_OK);
+    CHECK(urlsph_step(s, 1e-6) == URLSPH_OK && hash(s) != there);
+    urlsph_simulation *twin = create_from(metal_path, NULL, 3);
+    CHECK(twin);
+    urlsph_simulation *const both[2] = {s, twin};
+    for (int i = 0; i < 2; ++i) {
+        CHECK(urlsph_restore_snapshot(both[i], bytes, size) == URLSPH_OK && hash(both[i]) == saved);
+        CHECK(urlsph_step(both[i], 1e-6) == URLSPH_OK && hash(both[i]) == there);
+        CHECK(urlsph_get_energies(both[i], &now, sizeof now) == URLSPH_OK);
+        CHECK(memcmp(&then, &now, sizeof now) == 0);
+        CHECK(urlsph_get_heat_resultant(both[i], side, &again, sizeof again) == URLSPH_OK);
+        CHECK(memcmp(&flow, &again, sizeof again) == 0);
+    }
+    free(bytes);
+    CHECK(urlsph_destroy(twin) == URLSPH_OK);
     CHECK(urlsph_destroy(s) == URLSPH_OK);
 }
 
@@ -939,11 +1158,12 @@ static void divergence(void) {
 }
 
 int main(int argc, char **argv) {
-    if (argc != 2) {
-        fprintf(stderr, "usage: %s SCENE.json\n", argv[0]);
+    if (argc != 3) {
+        fprintf(stderr, "usage: %s SCENE.json METAL.json\n", argv[0]);
         return 2;
     }
     scene_path = argv[1];
+    metal_path = argv[2];
     RUN(versions);
     RUN(creation_from_text);
     RUN(creation_fails);
@@ -953,6 +1173,9 @@ int main(int argc, char **argv) {
     RUN(patches);
     RUN(fields);
     RUN(inputs);
+    RUN(heat_inputs);
+    RUN(heat_and_metal);
+    RUN(heat_snapshots);
     RUN(time_step);
     RUN(resultants);
     RUN(snapshots);

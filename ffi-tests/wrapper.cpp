@@ -17,7 +17,7 @@
 
 namespace {
 
-std::string scene_path;
+std::string scene_path, metal_path;
 
 urlsph::Simulation create(std::size_t threads = 2) {
     urlsph::Options options;
@@ -113,6 +113,48 @@ void queries() {
     CHECK(view.data[0] == values[3 * view.order[0]]);
 }
 
+void heat() {
+    urlsph::Options options;
+    options.threads = 2;
+    urlsph::Simulation s = urlsph::Simulation::from_file(metal_path, options);
+    const std::size_t top = s.patch("top"), side = s.patch("side"), back = s.patch("back");
+    s.set_traction(top, {0.0, 1.5e8, 0.0});
+    s.set_heat_flux(top, 1e9);
+    s.set_heat_flux(top, std::vector<double>(9, 2e9));
+    s.set_temperature(s.patch("bottom"), 400.0);
+    s.set_temperature(s.patch("bottom"), std::vector<double>(9, 410.0));
+    s.set_convection(side, 1e5, 500.0);
+    s.set_convection(side, std::vector<double>(15, 1e6), std::vector<double>{600.0});
+    s.set_convection_coefficient(side, 2e6);
+    s.set_convection_coefficient(side, std::vector<double>(15, 1e6));
+    s.set_ambient_temperature(back, 300.0);
+    s.set_ambient_temperature(side, std::vector<double>(15, 600.0));
+    CHECK(s.input(side, URLSPH_CONVECTION_COEFFICIENT) == std::vector<double>(15, 1e6));
+    CHECK(s.input(back, URLSPH_AMBIENT_TEMPERATURE) == std::vector<double>{300.0});
+    CHECK_NEAR(s.heat_resultant(top).heat_flow, 2e3, 1e-8);
+    CHECK_NEAR(s.heat_resultant(side).heat_flow, 604.0, 1e-6);
+    const urlsph::Error e = thrown([&] { s.set_convection_coefficient(back, 1.0); });
+    CHECK(e.code() == URLSPH_INVALID_ARGUMENT && e.boundary() == "back");
+    CHECK(thrown([&] { s.set_temperature(s.patch("bottom"), -1.0); }).field() == "temperature");
+
+    s.step(1e-6);
+    const std::vector<std::uint8_t> saved = s.snapshot();
+    s.step(1e-6);
+    const std::uint64_t there = s.state_hash();
+    s.restore(saved);
+    s.step(1e-6);
+    CHECK(s.state_hash() == there);
+    CHECK(s.energies().heat_in > 0.0 && s.energies().plastic_work > 0.0);
+    CHECK(s.probe_motion(s.probe("corner")).temperature > 298.0);
+    CHECK(s.heat_resultant(top).maximum_temperature > 298.0);
+    CHECK(s.read_field("temperature").size() == 45);
+
+    urlsph::Simulation cold = create();
+    CHECK(cold.field_info(cold.field("temperature")).is_present == 0);
+    CHECK(thrown([&] { (void)cold.read_field("temperature"); }).field() == "temperature");
+    CHECK(thrown([&] { (void)cold.heat_resultant(0); }).code() == URLSPH_INVALID_ARGUMENT);
+}
+
 void snapshots() {
     urlsph::Simulation s = create();
     s.set_traction(s.patch("top"), {1e4, 0.0, 0.0});
@@ -206,14 +248,16 @@ void threads() {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 2) {
-        std::fprintf(stderr, "usage: %s SCENE.json\n", argv[0]);
+    if (argc != 3) {
+        std::fprintf(stderr, "usage: %s SCENE.json METAL.json\n", argv[0]);
         return 2;
     }
     scene_path = argv[1];
+    metal_path = argv[2];
     RUN(creation);
     RUN(ownership);
     RUN(queries);
+    RUN(heat);
     RUN(snapshots);
     RUN(callbacks);
     RUN(threads);

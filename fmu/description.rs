@@ -21,6 +21,7 @@ type UnitRow = (&'static str, [i32; 4], &'static str);
 const UNITS: &[UnitRow] = &[
     ("1", [0, 0, 0, 0], "Dimensionless"),
     ("s", [0, 0, 1, 0], "Time"),
+    ("1/s", [0, 0, -1, 0], "Rate"),
     ("m", [0, 1, 0, 0], "Length"),
     ("m^2", [0, 2, 0, 0], "Area"),
     ("m^3", [0, 3, 0, 0], "Volume"),
@@ -35,10 +36,13 @@ const UNITS: &[UnitRow] = &[
     ("kg.m/s", [1, 1, -1, 0], "LinearMomentum"),
     ("kg.m^2/s", [1, 2, -1, 0], "AngularMomentum"),
     ("K", [0, 0, 0, 1], "Temperature"),
+    ("W", [1, 2, -3, 0], "HeatFlow"),
     ("W/m^2", [1, 0, -3, 0], "HeatFlux"),
     ("W/(m^2.K)", [1, 0, -3, -1], "HeatTransferCoefficient"),
-    ("W", [1, 2, -3, 0], "HeatFlow"),
+    ("W/(m.K)", [1, 1, -3, -1], "ThermalConductivity"),
     ("J/K", [1, 2, -2, -1], "Entropy"),
+    ("J/(m^3.K)", [1, -1, -2, -1], "EntropyDensity"),
+    ("J/(kg.K)", [0, 2, -2, -1], "SpecificHeat"),
 ];
 
 fn unit(variable: &Variable) -> Result<&'static UnitRow> {
@@ -450,7 +454,8 @@ pub(super) fn terminals(simulation: &Simulation, table: &Table) -> Result<String
                 element(xml, "Terminals", &[], |xml| {
                     for &p in &driven {
                         let patch = &simulation.patches()[p].name;
-                        let description = format!("Loads on and motion of patch {patch}");
+                        let description =
+                            format!("Loads on, heat through and motion of patch {patch}");
                         let list = [
                             ("name", patch.as_str()),
                             ("matchingRule", "bus"),

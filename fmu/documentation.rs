@@ -62,9 +62,9 @@ fn introduction(xml: &mut Xml, simulation: &Simulation) -> io::Result<()> {
     text(
         xml,
         "p",
-        "An elastic body in motion at large strain, computed with Updated Reference Lagrangian smoothed \
-         particle hydrodynamics. The importer sets loads on named patches of the boundary and reads how \
-         the body answers: forces, motion, energies, probes and fields.",
+        "A body in motion at large strain, computed with Updated Reference Lagrangian smoothed \
+         particle hydrodynamics. The importer sets loads and heat on named patches of the boundary and \
+         reads how the body answers: forces, motion, temperatures, energies, probes and fields.",
     )?;
     let plan = simulation.plan();
     text(
@@ -95,8 +95,9 @@ fn usage(xml: &mut Xml, simulation: &Simulation, table: &Table) -> io::Result<()
         "An input keeps its value until it is set again. A communication step of any length more than 0 \
          is made of as many stable time steps as it needs and ends exactly at its end."
             .to_owned(),
-        "Forces on a patch are those of the surroundings on the body: loads and support reactions. They \
-         answer an input at once, all other outputs answer through the next step."
+        "Forces on a patch are those of the surroundings on the body: loads and support reactions; heat \
+         flows are counted into the body. They answer an input at once, all other outputs answer \
+         through the next step. Temperatures are absolute."
             .to_owned(),
         "The simulation starts at 0; with another start time of the experiment, the times in the scene \
          count from there."

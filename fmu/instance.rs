@@ -297,10 +297,19 @@ impl Instance {
                     }
                     parameters[p] = given[0];
                 }
-                Slot::Input(_) => self.require(
-                    &[Phase::Instantiated, Phase::Initialization, Phase::Stepping],
-                    &format!("the input {} is set", variable.name),
-                )?,
+                Slot::Input(i) => {
+                    self.require(
+                        &[Phase::Instantiated, Phase::Initialization, Phase::Stepping],
+                        &format!("the input {} is set", variable.name),
+                    )?;
+                    let quantity = self.simulation.inputs()[i].quantity;
+                    for (k, value) in given.iter().enumerate() {
+                        quantity.check(*value).map_err(|why| {
+                            let name = variable.element_name(element + k);
+                            Error::argument(format!("{name} is set to {value}: {why}"))
+                        })?;
+                    }
+                }
                 Slot::Time | Slot::Output(_) => {
                     return Err(Error::argument(format!(
                         "{} is computed: it cannot be set",

@@ -114,8 +114,11 @@ pub(super) struct Table {
     pub token: String,
 }
 
-/// Numbers of a material law: key, unit, description.
-const MATERIAL: [(&str, &str, &str); 4] = [
+/// A number of a section of the scene: key, unit, description.
+type NumberRow = (&'static str, &'static str, &'static str);
+
+/// Numbers of the material laws.
+const MATERIAL: &[NumberRow] = &[
     ("density", "kg/m^3", "Density in the initial configuration"),
     (
         "youngs_modulus",
@@ -132,26 +135,62 @@ const MATERIAL: [(&str, &str, &str); 4] = [
         "1",
         "Share of the shear modulus carried by the cofactor term",
     ),
+    ("yield_stress", "Pa", "Initial yield stress"),
+    ("hardening_modulus", "Pa", "Hardening modulus"),
+    ("saturation_stress", "Pa", "Saturation stress"),
+    ("saturation_exponent", "1", "Saturation exponent"),
+    ("hardening_exponent", "1", "Hardening exponent"),
+    ("rate_coefficient", "1", "Strain-rate coefficient"),
+    ("reference_strain_rate", "1/s", "Reference strain rate"),
+    ("softening_exponent", "1", "Temperature exponent"),
+    ("melting_temperature", "K", "Melting temperature"),
+    (
+        "transition_temperature",
+        "K",
+        "Temperature up to which the yield stress does not depend on it",
+    ),
+];
+
+/// Numbers of the section `heat`.
+const HEAT: &[NumberRow] = &[
+    (
+        "specific_heat",
+        "J/(kg.K)",
+        "Specific heat at constant volume",
+    ),
+    ("reference_temperature", "K", "Reference temperature"),
+    ("conductivity", "W/(m.K)", "Thermal conductivity"),
+    ("gruneisen_coefficient", "1", "Mie-Grueneisen coefficient"),
+    ("gruneisen_exponent", "1", "Mie-Grueneisen exponent"),
+    (
+        "plastic_heat_fraction",
+        "1",
+        "Share of the plastic work that becomes heat",
+    ),
 ];
 
 fn parameters(simulation: &Simulation) -> Result<Vec<Parameter>> {
     let scene = simulation.scene();
     let mut list = Vec::new();
     let tree = scene_tree(scene)?;
-    // One law: `material` is an object with one key.
-    for (law, numbers) in tree["material"].as_object().into_iter().flatten() {
-        for (key, unit, description) in MATERIAL {
+    let mut section = |place: &str, name: &str, rows: &[NumberRow], numbers: &Value| {
+        for &(key, unit, description) in rows {
             if let Some(start) = numbers[key].as_f64() {
                 list.push(Parameter {
-                    path: Some(format!("material.{law}.{key}")),
-                    name: format!("material.{key}"),
+                    path: Some(format!("{place}.{key}")),
+                    name: format!("{name}.{key}"),
                     unit,
                     description,
                     start,
                 });
             }
         }
+    };
+    // One law: `material` is an object with one key.
+    for (law, numbers) in tree["material"].as_object().into_iter().flatten() {
+        section(&format!("material.{law}"), "material", MATERIAL, numbers);
     }
+    section("heat", "heat", HEAT, &tree["heat"]);
     let numerics = &scene.numerics;
     let mut number = |key: &str, unit, description, start| {
         list.push(Parameter {
@@ -253,7 +292,7 @@ impl Table {
             let patch = &simulation.patches()[input.patch];
             let rows = (input.per_particle && detailed.contains(&input.patch))
                 .then_some(patch.particles.len());
-            // The means of what the body does have the plain names `velocity` and `temperature`.
+            // What is prescribed is not what the body does, even of the same kind.
             let (name, text) = match input.quantity {
                 Quantity::Velocity => ("prescribed_velocity", "Prescribed velocity"),
                 Quantity::Traction => ("traction", "Dead traction per unit initial area"),

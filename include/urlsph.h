@@ -264,11 +264,11 @@ typedef struct urlsph_counts {
     uint64_t steps;
 } urlsph_counts;
 
-// Energies [J].
+// Energies [J] and entropies [J/K]. What the scene does not have is 0.
 typedef struct urlsph_energies {
     // Kinetic energy.
     double kinetic;
-    // Strain energy.
+    // Strain energy; with heat the mechanical part of the internal energy.
     double strain;
     // Work of tractions, pressures, body force and moving supports since time 0.
     double external_work;
@@ -276,8 +276,25 @@ typedef struct urlsph_energies {
     double numerical_dissipation;
     // Energy taken out by the angular-momentum projection since time 0, of either sign.
     double projection;
-    // kinetic + strain + numerical_dissipation + projection - external_work - initial energy.
+    // What is stored and dissipated less what was supplied and the initial energy: kinetic + strain +
+    // thermal + plastic work that did not become heat + numerical_dissipation +
+    // contact_dissipation + projection - external_work - heat_in - initial energy.
     double closure_error;
+    // Thermal part of the internal energy, from the reference temperature on.
+    double thermal;
+    // Heat from sources, heat fluxes, convection and prescribed temperatures since time 0.
+    double heat_in;
+    // Plastic work since time 0. With heat its part that became heat is in `thermal` as well.
+    double plastic_work;
+    // Ballistic energy, kinetic + strain + thermal - reference temperature x entropy: without
+    // supply from outside it never rises.
+    double ballistic;
+    // Entropy [J/K].
+    double entropy;
+    // Entropy produced by conduction and plastic flow since time 0 [J/K]: never falls.
+    double entropy_production;
+    // Kinetic energy lost in inelastic contact since time 0: never falls.
+    double contact_dissipation;
 } urlsph_energies;
 
 // Momenta of the whole body.
@@ -310,6 +327,17 @@ typedef struct urlsph_resultant {
     double mean_velocity[3];
 } urlsph_resultant;
 
+// Heat through a patch, and its temperature.
+typedef struct urlsph_heat_resultant {
+    // Heat that flows into the body through this patch [W]: flux, convection, and what a prescribed
+    // temperature draws.
+    double heat_flow;
+    // Mean absolute temperature, weighted with the initial areas [K].
+    double mean_temperature;
+    // Highest absolute temperature of its particles [K].
+    double maximum_temperature;
+} urlsph_heat_resultant;
+
 // A field: one value per particle.
 typedef struct urlsph_field_info {
     // Stable name, such as `velocity`; valid until the simulation is destroyed.
@@ -324,6 +352,10 @@ typedef struct urlsph_field_info {
     urlsph_configuration configuration;
     // 1 if `urlsph_get_view` gives it without a copy, otherwise 0.
     int32_t has_view;
+    // 1 if this simulation has it; 0 if the scene lacks what it takes, such as heat or plasticity.
+    int32_t is_present;
+    // Always 0.
+    int32_t reserved;
 } urlsph_field_info;
 
 // A read-only look at the memory of a field, without a copy.
@@ -354,12 +386,14 @@ typedef struct urlsph_probe_info {
     double position[3];
 } urlsph_probe_info;
 
-// Motion of a probe, interpolated between the particles around it.
+// Motion of a probe and its temperature, interpolated between the particles around it.
 typedef struct urlsph_probe_motion {
     // Displacement [m].
     double displacement[3];
     // Velocity [m/s].
     double velocity[3];
+    // Absolute temperature [K]; 0 of a body without heat.
+    double temperature;
 } urlsph_probe_motion;
 
 // An input: a condition that the scene declares as `external`.
@@ -368,7 +402,7 @@ typedef struct urlsph_input_info {
     size_t patch;
     // Number of the patch's particles.
     size_t particles;
-    // Components of one value: 3, or 1 for a pressure.
+    // Components of one value: 3 of a traction or a velocity, otherwise 1.
     size_t components;
     // What is set.
     urlsph_quantity quantity;
@@ -576,6 +610,18 @@ urlsph_status urlsph_get_resultant(const struct urlsph_simulation *simulation,
                                    struct urlsph_resultant *resultant,
                                    size_t resultant_size);
 
+// Heat flow through a patch, its mean and its maximum temperature now.
+//
+// - `patch`: index of the patch.
+// - `resultant`, `resultant_size`: receives them; the size of the struct.
+//
+// Errors: `URLSPH_INVALID_ARGUMENT`, also for a body without temperature, whose scene has no section
+// `heat`; `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+urlsph_status urlsph_get_heat_resultant(const struct urlsph_simulation *simulation,
+                                        size_t patch,
+                                        struct urlsph_heat_resultant *resultant,
+                                        size_t resultant_size);
+
 // Index of the field of this name.
 //
 // - `name`: NUL-terminated UTF-8, such as `cauchy_stress`.
@@ -604,7 +650,8 @@ urlsph_status urlsph_get_field_info(const struct urlsph_simulation *simulation,
 //   of the field, particles in the caller's order.
 // - `capacity`: room in `values`, in numbers; it may be larger than needed.
 //
-// Errors: `URLSPH_INVALID_ARGUMENT`, `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+// Errors: `URLSPH_INVALID_ARGUMENT`, also for a field that this simulation does not have (see
+// `urlsph_field_info.is_present`), with what the scene would need; `URLSPH_BUSY`, `URLSPH_INTERNAL`.
 urlsph_status urlsph_read_field(const struct urlsph_simulation *simulation,
                                 size_t field,
                                 double *values,
@@ -654,7 +701,7 @@ urlsph_status urlsph_get_probe_info(const struct urlsph_simulation *simulation,
                                     struct urlsph_probe_info *info,
                                     size_t info_size);
 
-// Displacement and velocity of a probe now.
+// Displacement, velocity and temperature of a probe now.
 //
 // - `probe`: index of the probe.
 // - `motion`, `motion_size`: receives them; the size of the struct.
@@ -715,6 +762,50 @@ urlsph_status urlsph_set_velocity(struct urlsph_simulation *simulation,
                                   size_t patch,
                                   const double *values,
                                   size_t count);
+
+// Sets the heat flux into the body through a patch, per unit initial area, whose condition the
+// scene declares as `external`. It holds from now on, until it is set again.
+//
+// - `values`: [W/m^2], 1 number for the whole patch, or one per particle in the order of
+//   `urlsph_read_patch_particles`.
+// - `count`: number of `values`.
+//
+// Errors: as for `urlsph_set_traction`.
+urlsph_status urlsph_set_heat_flux(struct urlsph_simulation *simulation,
+                                   size_t patch,
+                                   const double *values,
+                                   size_t count);
+
+// Sets the absolute temperature of a patch, whose condition the scene declares as `external`. The
+// particles take it at the start of the next step, and hold it until it is set again.
+//
+// - `values`: [K], above 0; 1 number for the whole patch, or one per particle in the order of
+//   `urlsph_read_patch_particles`.
+// - `count`: number of `values`.
+//
+// Errors: as for `urlsph_set_traction`, and for a temperature that is not above 0.
+urlsph_status urlsph_set_temperature(struct urlsph_simulation *simulation,
+                                     size_t patch,
+                                     const double *values,
+                                     size_t count);
+
+// Sets the convection on a patch: heat flows in at coefficient x (ambient temperature - temperature)
+// per unit initial area. Each of the two can be set if the scene declares it as `external`. They
+// hold from now on, until they are set again.
+//
+// - `coefficients`, `coefficient_count`: [W/(m^2 K)], 0 or more; NULL and 0 to leave them as they are.
+// - `ambient_temperatures`, `ambient_count`: [K], above 0; NULL and 0 to leave them as they are.
+// - Counts: 1 number for the whole patch, or one per particle in the order of
+//   `urlsph_read_patch_particles`; the two need not be alike.
+//
+// Errors: as for `urlsph_set_traction`, for a value out of its range, and if there is nothing to set.
+// Nothing is changed then.
+urlsph_status urlsph_set_convection(struct urlsph_simulation *simulation,
+                                    size_t patch,
+                                    const double *coefficients,
+                                    size_t coefficient_count,
+                                    const double *ambient_temperatures,
+                                    size_t ambient_count);
 
 // Copies the present values of an input, as last set or as the scene starts them.
 //

@@ -163,7 +163,7 @@ public:
     double end_time() const { return value<double>(urlsph_get_end_time); }
     /// Largest stable time step [s].
     double stable_step() const { return value<double>(urlsph_get_stable_step); }
-    /// Energies [J].
+    /// Energies [J] and entropies [J/K].
     urlsph_energies energies() const { return get<urlsph_energies>(urlsph_get_energies); }
     /// Momenta [kg m/s], [kg m^2/s].
     urlsph_momenta momenta() const { return get<urlsph_momenta>(urlsph_get_momenta); }
@@ -194,6 +194,10 @@ public:
     urlsph_resultant resultant(std::size_t patch) const {
         return get<urlsph_resultant>(urlsph_get_resultant, patch);
     }
+    /// Heat flow [W] and temperatures [K] of a patch; only of a body with heat.
+    urlsph_heat_resultant heat_resultant(std::size_t patch) const {
+        return get<urlsph_heat_resultant>(urlsph_get_heat_resultant, patch);
+    }
 
     /// Index of a field.
     std::size_t field(const std::string& name) const { return find(urlsph_find_field, name); }
@@ -223,7 +227,7 @@ public:
     urlsph_probe_info probe_info(std::size_t probe) const {
         return get<urlsph_probe_info>(urlsph_get_probe_info, probe);
     }
-    /// Displacement and velocity of a probe.
+    /// Displacement, velocity and temperature of a probe.
     urlsph_probe_motion probe_motion(std::size_t probe) const {
         return get<urlsph_probe_motion>(urlsph_get_probe_motion, probe);
     }
@@ -263,6 +267,48 @@ public:
     /// Sets a velocity [m/s]: 3 numbers, or 3 per particle of the patch.
     void set_velocity(std::size_t patch, Span<double> values) {
         check(urlsph_set_velocity(handle_, patch, values.data(), values.size()));
+    }
+    /// Sets a heat flux into the body [W/m^2], one for the patch.
+    void set_heat_flux(std::size_t patch, double value) {
+        set_heat_flux(patch, Span<double>(&value, 1));
+    }
+    /// Sets a heat flux into the body [W/m^2]: 1 number, or 1 per particle of the patch.
+    void set_heat_flux(std::size_t patch, Span<double> values) {
+        check(urlsph_set_heat_flux(handle_, patch, values.data(), values.size()));
+    }
+    /// Sets an absolute temperature [K], one for the patch.
+    void set_temperature(std::size_t patch, double value) {
+        set_temperature(patch, Span<double>(&value, 1));
+    }
+    /// Sets an absolute temperature [K]: 1 number, or 1 per particle of the patch.
+    void set_temperature(std::size_t patch, Span<double> values) {
+        check(urlsph_set_temperature(handle_, patch, values.data(), values.size()));
+    }
+    /// Sets the convection: coefficient [W/(m^2 K)] and ambient temperature [K], one for the patch.
+    void set_convection(std::size_t patch, double coefficient, double ambient_temperature) {
+        set_convection(patch, Span<double>(&coefficient, 1), Span<double>(&ambient_temperature, 1));
+    }
+    /// Sets the convection: each 1 number, or 1 per particle of the patch.
+    void set_convection(std::size_t patch, Span<double> coefficients,
+                        Span<double> ambient_temperatures) {
+        check(urlsph_set_convection(handle_, patch, coefficients.data(), coefficients.size(),
+                                    ambient_temperatures.data(), ambient_temperatures.size()));
+    }
+    /// Sets the coefficient of the convection alone [W/(m^2 K)], one for the patch.
+    void set_convection_coefficient(std::size_t patch, double value) {
+        set_convection_coefficient(patch, Span<double>(&value, 1));
+    }
+    /// Sets the coefficient of the convection alone: 1 number, or 1 per particle of the patch.
+    void set_convection_coefficient(std::size_t patch, Span<double> values) {
+        check(urlsph_set_convection(handle_, patch, values.data(), values.size(), nullptr, 0));
+    }
+    /// Sets the ambient temperature of the convection alone [K], one for the patch.
+    void set_ambient_temperature(std::size_t patch, double value) {
+        set_ambient_temperature(patch, Span<double>(&value, 1));
+    }
+    /// Sets the ambient temperature of the convection alone: 1 number, or 1 per particle.
+    void set_ambient_temperature(std::size_t patch, Span<double> values) {
+        check(urlsph_set_convection(handle_, patch, nullptr, 0, values.data(), values.size()));
     }
 
     /// Advances by dt [s].

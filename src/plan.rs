@@ -3,7 +3,8 @@
 use crate::particles::MeshSummary;
 use crate::reference::Repair;
 use crate::scene::{
-    Limiter, Neighbours, Operators, Reconstruction, ReferenceUpdate, Scene, StateMeasures, Weights,
+    Limiter, Material, Neighbours, Operators, Reconstruction, ReferenceUpdate, Scene,
+    StateMeasures, Weights,
 };
 
 /// What a scene will cost.
@@ -35,15 +36,11 @@ pub struct Plan {
 pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec<String>) {
     let n = &scene.numerics;
     let mut on = vec![match &scene.material {
-        crate::scene::Material::NeoHookean(_) => "neo-Hookean elasticity".to_string(),
-        crate::scene::Material::MooneyRivlin(_) => "Mooney-Rivlin elasticity".to_string(),
-        crate::scene::Material::LinearElastic(_) => "linear elasticity".to_string(),
-        crate::scene::Material::VonMises(_) => {
-            "Hencky elasticity, von Mises plasticity".to_string()
-        }
-        crate::scene::Material::JohnsonCook(_) => {
-            "Hencky elasticity, Johnson-Cook plasticity".to_string()
-        }
+        Material::NeoHookean(_) => "neo-Hookean elasticity".to_string(),
+        Material::MooneyRivlin(_) => "Mooney-Rivlin elasticity".to_string(),
+        Material::LinearElastic(_) => "linear elasticity".to_string(),
+        Material::VonMises(_) => "Hencky elasticity, von Mises plasticity".to_string(),
+        Material::JohnsonCook(_) => "Hencky elasticity, Johnson-Cook plasticity".to_string(),
     }];
     on.push(match n.neighbours {
         Neighbours::Lattice(count) => format!("{count} lattice neighbours"),
@@ -110,5 +107,47 @@ pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec
         "contact with rigid planes".to_string(),
     );
     feature(scene.body_force.is_some(), "body force".to_string());
+    let plastic = matches!(
+        scene.material,
+        Material::VonMises(_) | Material::JohnsonCook(_)
+    );
+    if !plastic {
+        feature(false, "plasticity".to_string());
+    }
+    let Some(heat) = &scene.heat else {
+        feature(false, "heat".to_string());
+        return (on, off);
+    };
+    feature(
+        true,
+        format!(
+            "heat (specific heat {} J/(kg K), reference temperature {} K)",
+            heat.specific_heat, heat.reference_temperature
+        ),
+    );
+    feature(
+        heat.conductivity > 0.0,
+        match heat.conductivity {
+            0.0 => "conduction".to_string(),
+            conductivity => format!("conduction ({conductivity} W/(m K))"),
+        },
+    );
+    feature(
+        heat.gruneisen_coefficient > 0.0,
+        match heat.gruneisen_coefficient {
+            0.0 => "thermal expansion".to_string(),
+            gamma => format!("thermal expansion (Mie-Grueneisen coefficient {gamma})"),
+        },
+    );
+    if plastic {
+        feature(
+            heat.plastic_heat_fraction > 0.0,
+            format!(
+                "plastic heating ({} of the work)",
+                heat.plastic_heat_fraction
+            ),
+        );
+    }
+    feature(heat.source.is_some(), "heat source".to_string());
     (on, off)
 }

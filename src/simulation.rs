@@ -94,13 +94,15 @@ pub struct Progress {
     pub steps: u64,
 }
 
-/// Motion of a probe.
+/// Motion of a probe, and its temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProbeMotion {
     /// Displacement [m].
     pub displacement: [f64; 3],
     /// Velocity [m/s].
     pub velocity: [f64; 3],
+    /// Absolute temperature [K]; `None` of a body without heat.
+    pub temperature: Option<f64>,
 }
 
 /// A read-only look at a state array without a copy.
@@ -680,7 +682,7 @@ impl Simulation {
         &self.probes.names
     }
 
-    /// Motion of a probe, interpolated between the particles around its initial position.
+    /// Motion and temperature of a probe, interpolated between the particles around its initial position.
     ///
     /// # Panics
     /// If `probe` is not an index into [`probe_names`](Self::probe_names).
@@ -688,12 +690,16 @@ impl Simulation {
         let mut motion = ProbeMotion {
             displacement: [0.0; 3],
             velocity: [0.0; 3],
+            temperature: self.url.thermal().map(|_| 0.0),
         };
         for &(particle, weight) in &self.probes.weights[probe] {
             let slot = Layout::slot(particle as usize);
             let u = sub3(self.state.x.get(slot), self.reference.x_initial.get(slot));
             motion.displacement = axpy3(motion.displacement, weight, u);
             motion.velocity = axpy3(motion.velocity, weight, self.state.v.get(slot));
+            if let Some(temperature) = &mut motion.temperature {
+                *temperature += weight * self.url.temperature(&self.state, &self.reference, slot);
+            }
         }
         motion
     }
@@ -711,13 +717,28 @@ impl Simulation {
     /// [`Code::InvalidArgument`] if the scene does not declare this input as `external`,
     /// if the length is neither, or if a value is not finite. Nothing is changed then.
     pub fn set_input(&mut self, patch: usize, quantity: Quantity, values: &[f64]) -> Result<()> {
-        let index = self.boundary.input_index(patch, quantity)?;
-        self.boundary.check_input(index, values)?;
-        let old = std::mem::replace(&mut self.inputs[index], values.to_vec());
+        self.set_inputs(patch, &[(quantity, values)])
+    }
+
+    /// Sets several inputs of a patch, all of them or, on failure, none.
+    ///
+    /// # Errors
+    /// As [`set_input`](Self::set_input).
+    pub fn set_inputs(&mut self, patch: usize, values: &[(Quantity, &[f64])]) -> Result<()> {
+        let mut given = Vec::with_capacity(values.len());
+        for &(quantity, values) in values {
+            let index = self.boundary.input_index(patch, quantity)?;
+            self.boundary.check_input(index, values)?;
+            given.push((index, values.to_vec()));
+        }
+        let old = self.inputs.clone();
+        for (index, values) in given {
+            self.inputs[index] = values;
+        }
         match self.compute_resultants() {
             Ok(resultants) => self.resultants = resultants,
             Err(error) => {
-                self.inputs[index] = old;
+                self.inputs = old;
                 return Err(error);
             }
         }

@@ -16,15 +16,22 @@ import numpy as np
 import pytest
 
 import urlsph
-from urlsph import _library
+from urlsph import _library, _simulation
 
 SCENE = Path(__file__).parents[1] / "scene.json"
+METAL = SCENE.with_name("metal.json")
 ROOT = SCENE.parents[1]
 
 
 @pytest.fixture
 def column():
     with urlsph.Simulation(SCENE, threads=2) as simulation:
+        yield simulation
+
+
+@pytest.fixture
+def metal():
+    with urlsph.Simulation(METAL, threads=2) as simulation:
         yield simulation
 
 
@@ -49,13 +56,21 @@ def test_status_numbers_are_those_of_the_header():
     assert numbers == {status.name: int(status) for status in urlsph.Status}
 
 
-def test_structs_are_as_large_as_the_library_has_them(column):
+def test_quantity_numbers_are_those_of_the_header():
+    header = (ROOT / "include" / "urlsph.h").read_text()
+    body = header.split("enum urlsph_quantity")[1].split("};")[0]
+    numbers = {name.lower(): int(n) for name, n in re.findall(r"URLSPH_(\w+) = (\d+)", body)}
+    assert numbers == _simulation._QUANTITIES
+
+
+def test_structs_are_as_large_as_the_library_has_them(metal):
     structs = {
         "urlsph_get_counts": (_library.CountsStruct, ()),
         "urlsph_get_energies": (_library.EnergiesStruct, ()),
         "urlsph_get_momenta": (_library.MomentaStruct, ()),
         "urlsph_get_patch_info": (_library.PatchInfoStruct, (0,)),
         "urlsph_get_resultant": (_library.ResultantStruct, (0,)),
+        "urlsph_get_heat_resultant": (_library.HeatResultantStruct, (0,)),
         "urlsph_get_field_info": (_library.FieldInfoStruct, (0,)),
         "urlsph_get_view": (_library.ViewStruct, (0,)),
         "urlsph_get_probe_info": (_library.ProbeInfoStruct, (0,)),
@@ -65,7 +80,7 @@ def test_structs_are_as_large_as_the_library_has_them(column):
     }
     for name, (struct, index) in structs.items():
         with pytest.raises(urlsph.InvalidArgumentError) as e:
-            column._call(getattr(_library.lib, name), *index, struct(), 1)
+            metal._call(getattr(_library.lib, name), *index, struct(), 1)
         assert f"{ctypes.sizeof(struct)} bytes" in str(e.value), name
 
 
@@ -129,6 +144,11 @@ def test_fields(column):
     column.set_traction("top", [1e4, 0.0, 0.0])
     column.step(1e-3)
     for name, field in column.fields.items():
+        if not field.is_present:
+            with pytest.raises(urlsph.InvalidArgumentError) as e:
+                column.read(name)
+            assert e.value.field == name
+            continue
         values = column.read(name)
         assert values.shape == (45, *field.shape) and np.isfinite(values).all()
         again = np.full_like(values, np.nan)
@@ -147,6 +167,8 @@ def test_fields(column):
     print(f"det F against J: residual {residual:.3e}, tolerance 1e-12")
     assert residual < 1e-12
     with pytest.raises(urlsph.InvalidArgumentError, match="velocity"):
+        column.read("colour")
+    with pytest.raises(urlsph.InvalidArgumentError, match="`heat`"):
         column.read("temperature")
     for out in (
         np.empty((45, 4)),
@@ -225,6 +247,58 @@ def test_inputs(column):
         with pytest.raises(urlsph.InvalidArgumentError):
             wrong()
     assert column.state_hash == before
+
+
+def test_heat(metal):
+    metal.set_traction("top", [0.0, 1.5e8, 0.0])
+    metal.set_heat_flux("top", np.full(9, 1e9))
+    metal.set_temperature("bottom", 400.0)
+    metal.set_convection("side", coefficient=1e6, ambient_temperature=np.full(15, 600.0))
+    metal.set_convection("back", ambient_temperature=300.0)
+    np.testing.assert_array_equal(metal.input("side", "convection_coefficient"), [1e6])
+    np.testing.assert_array_equal(metal.input("side", "ambient_temperature"), np.full(15, 600.0))
+    assert metal.heat_resultant("top").heat_flow == pytest.approx(1e3, rel=1e-12)
+    assert metal.heat_resultant("side").heat_flow == pytest.approx(604.0, rel=1e-9)
+    before = metal.state_hash
+    for wrong in (
+        lambda: metal.set_heat_flux("top", [1.0, 2.0]),
+        lambda: metal.set_temperature("bottom", 0.0),
+        lambda: metal.set_convection("side", coefficient=-1.0),
+        lambda: metal.set_convection("side"),
+        lambda: metal.set_convection("back", coefficient=1.0, ambient_temperature=300.0),
+        lambda: metal.set_temperature("top", 300.0),
+    ):
+        with pytest.raises(urlsph.InvalidArgumentError):
+            wrong()
+    assert metal.state_hash == before
+
+    metal.step(1e-6)
+    saved = metal.snapshot()
+    metal.step(1e-6)
+    there = metal.state_hash
+    metal.restore(saved)
+    metal.step(1e-6)
+    assert metal.state_hash == there
+    temperature = metal.read("temperature")
+    bottom = metal.patches["bottom"].particles
+    np.testing.assert_allclose(temperature[bottom], 400.0, rtol=1e-12)
+    top = metal.patches["top"]
+    resultant = metal.heat_resultant("top")
+    assert resultant.maximum_temperature == temperature[top.particles].max()
+    mean = top.areas @ temperature[top.particles] / top.area
+    assert resultant.mean_temperature == pytest.approx(mean, rel=1e-13)
+    corner = metal.probe("corner").temperature
+    assert np.abs(temperature - corner).min() < 1e-9
+    assert metal.read("equivalent_plastic_strain").max() > 0
+    energies = metal.energies
+    assert energies.heat_in > 0 and energies.plastic_work > 0 and energies.entropy_production > 0
+
+
+def test_a_body_without_heat_has_no_temperature(column):
+    assert column.probe("corner").temperature is None
+    assert column.energies.thermal == column.energies.entropy == 0.0
+    with pytest.raises(urlsph.InvalidArgumentError, match="`heat`"):
+        column.heat_resultant("top")
 
 
 def test_step(column):

@@ -116,7 +116,7 @@ impl Quantity {
         }
     }
     /// Whether a value makes sense, beside being finite.
-    fn check(self, value: f64) -> std::result::Result<(), &'static str> {
+    pub(crate) fn check(self, value: f64) -> std::result::Result<(), &'static str> {
         match self {
             Self::Temperature | Self::AmbientTemperature if value <= 0.0 => {
                 Err("an absolute temperature is above 0 K")

@@ -66,6 +66,101 @@ pub unsafe extern "C" fn urlsph_set_velocity(
     unsafe { set(simulation, patch, Quantity::Velocity, values, count) }
 }
 
+/// Sets the heat flux into the body through a patch, per unit initial area, whose condition the
+/// scene declares as `external`. It holds from now on, until it is set again.
+///
+/// - `values`: [W/m^2], 1 number for the whole patch, or one per particle in the order of
+///   `urlsph_read_patch_particles`.
+/// - `count`: number of `values`.
+///
+/// Errors: as for `urlsph_set_traction`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_set_heat_flux(
+    simulation: *mut urlsph_simulation,
+    patch: usize,
+    values: *const f64,
+    count: usize,
+) -> urlsph_status {
+    // SAFETY: the caller's pointer, as the header's preamble demands.
+    unsafe { set(simulation, patch, Quantity::HeatFlux, values, count) }
+}
+
+/// Sets the absolute temperature of a patch, whose condition the scene declares as `external`. The
+/// particles take it at the start of the next step, and hold it until it is set again.
+///
+/// - `values`: [K], above 0; 1 number for the whole patch, or one per particle in the order of
+///   `urlsph_read_patch_particles`.
+/// - `count`: number of `values`.
+///
+/// Errors: as for `urlsph_set_traction`, and for a temperature that is not above 0.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_set_temperature(
+    simulation: *mut urlsph_simulation,
+    patch: usize,
+    values: *const f64,
+    count: usize,
+) -> urlsph_status {
+    // SAFETY: the caller's pointer, as the header's preamble demands.
+    unsafe { set(simulation, patch, Quantity::Temperature, values, count) }
+}
+
+/// Sets the convection on a patch: heat flows in at coefficient x (ambient temperature - temperature)
+/// per unit initial area. Each of the two can be set if the scene declares it as `external`. They
+/// hold from now on, until they are set again.
+///
+/// - `coefficients`, `coefficient_count`: [W/(m^2 K)], 0 or more; NULL and 0 to leave them as they are.
+/// - `ambient_temperatures`, `ambient_count`: [K], above 0; NULL and 0 to leave them as they are.
+/// - Counts: 1 number for the whole patch, or one per particle in the order of
+///   `urlsph_read_patch_particles`; the two need not be alike.
+///
+/// Errors: as for `urlsph_set_traction`, for a value out of its range, and if there is nothing to set.
+/// Nothing is changed then.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_set_convection(
+    simulation: *mut urlsph_simulation,
+    patch: usize,
+    coefficients: *const f64,
+    coefficient_count: usize,
+    ambient_temperatures: *const f64,
+    ambient_count: usize,
+) -> urlsph_status {
+    with(simulation, |session| {
+        patch_at(session.simulation()?, patch)?;
+        // SAFETY: the caller's pointers, as the header's preamble demands.
+        let given = unsafe {
+            [
+                (
+                    Quantity::ConvectionCoefficient,
+                    optional(coefficients, coefficient_count, "coefficients")?,
+                ),
+                (
+                    Quantity::AmbientTemperature,
+                    optional(ambient_temperatures, ambient_count, "ambient_temperatures")?,
+                ),
+            ]
+        };
+        let values: Vec<(Quantity, &[f64])> = given
+            .into_iter()
+            .filter_map(|(quantity, values)| Some((quantity, values?)))
+            .collect();
+        if values.is_empty() {
+            return Err(Error::argument(
+                "there is nothing to set: give `coefficients`, `ambient_temperatures`, or both",
+            ));
+        }
+        session.simulation_mut()?.set_inputs(patch, &values)
+    })
+}
+
+/// An array that may be left out, as NULL and 0.
+unsafe fn optional<'a>(values: *const f64, count: usize, name: &str) -> Result<Option<&'a [f64]>> {
+    if values.is_null() && count == 0 {
+        return Ok(None);
+    }
+    // SAFETY: the caller's pointer, as the header's preamble demands.
+    unsafe { array(values, count, name) }.map(Some)
+}
+
 unsafe fn set(
     simulation: *mut urlsph_simulation,
     patch: usize,

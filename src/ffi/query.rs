@@ -5,9 +5,9 @@ use std::ffi::c_char;
 use super::args::{buffer, put, put_struct, text};
 use super::handle::with;
 use super::types::{
-    urlsph_configuration, urlsph_counts, urlsph_energies, urlsph_field_info, urlsph_input_info,
-    urlsph_momenta, urlsph_patch_info, urlsph_probe_info, urlsph_probe_motion, urlsph_quantity,
-    urlsph_resultant, urlsph_simulation, urlsph_status, urlsph_view,
+    urlsph_configuration, urlsph_counts, urlsph_energies, urlsph_field_info, urlsph_heat_resultant,
+    urlsph_input_info, urlsph_momenta, urlsph_patch_info, urlsph_probe_info, urlsph_probe_motion,
+    urlsph_quantity, urlsph_resultant, urlsph_simulation, urlsph_status, urlsph_view,
 };
 use crate::boundary::{Patch, Quantity};
 use crate::error::{Error, Result};
@@ -196,6 +196,13 @@ pub unsafe extern "C" fn urlsph_get_energies(
             numerical_dissipation: e.numerical_dissipation,
             projection: e.projection,
             closure_error: e.closure_error,
+            thermal: e.thermal,
+            heat_in: e.heat_in,
+            plastic_work: e.plastic_work,
+            ballistic: e.ballistic,
+            entropy: e.entropy,
+            entropy_production: e.entropy_production,
+            contact_dissipation: e.contact_dissipation,
         };
         // SAFETY: the caller's pointer, as the header's preamble demands.
         unsafe { put_struct(energies, energies_size, &value, "energies") }
@@ -368,6 +375,39 @@ pub unsafe extern "C" fn urlsph_get_resultant(
     })
 }
 
+/// Heat flow through a patch, its mean and its maximum temperature now.
+///
+/// - `patch`: index of the patch.
+/// - `resultant`, `resultant_size`: receives them; the size of the struct.
+///
+/// Errors: `URLSPH_INVALID_ARGUMENT`, also for a body without temperature, whose scene has no section
+/// `heat`; `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_get_heat_resultant(
+    simulation: *const urlsph_simulation,
+    patch: usize,
+    resultant: *mut urlsph_heat_resultant,
+    resultant_size: usize,
+) -> urlsph_status {
+    with(simulation, |session| {
+        let simulation = session.simulation()?;
+        let name = &patch_at(simulation, patch)?.name;
+        let r = simulation.heat_resultant(patch).ok_or_else(|| {
+            Error::argument(
+                "no heat flows here: the body has no temperature; add a section `heat` to the scene",
+            )
+            .at_boundary(name)
+        })?;
+        let value = urlsph_heat_resultant {
+            heat_flow: r.heat_flow,
+            mean_temperature: r.mean_temperature,
+            maximum_temperature: r.maximum_temperature,
+        };
+        // SAFETY: the caller's pointer, as the header's preamble demands.
+        unsafe { put_struct(resultant, resultant_size, &value, "resultant") }
+    })
+}
+
 // Fields.
 
 /// Index of the field of this name.
@@ -405,6 +445,7 @@ pub unsafe extern "C" fn urlsph_get_field_info(
     info_size: usize,
 ) -> urlsph_status {
     with(simulation, |session| {
+        let simulation = session.simulation()?;
         let f = field_at(field)?;
         let names = &session.names.fields[field];
         let value = urlsph_field_info {
@@ -413,7 +454,9 @@ pub unsafe extern "C" fn urlsph_get_field_info(
             description: names.description.as_ptr(),
             components: f.components,
             configuration: f.configuration.into(),
-            has_view: session.simulation()?.view(f.field).is_some().into(),
+            has_view: simulation.view(f.field).is_some().into(),
+            is_present: simulation.has_field(f.field).is_ok().into(),
+            reserved: 0,
         };
         // SAFETY: the caller's pointer, as the header's preamble demands.
         unsafe { put_struct(info, info_size, &value, "info") }
@@ -427,7 +470,8 @@ pub unsafe extern "C" fn urlsph_get_field_info(
 ///   of the field, particles in the caller's order.
 /// - `capacity`: room in `values`, in numbers; it may be larger than needed.
 ///
-/// Errors: `URLSPH_INVALID_ARGUMENT`, `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+/// Errors: `URLSPH_INVALID_ARGUMENT`, also for a field that this simulation does not have (see
+/// `urlsph_field_info.is_present`), with what the scene would need; `URLSPH_BUSY`, `URLSPH_INTERNAL`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn urlsph_read_field(
     simulation: *const urlsph_simulation,
@@ -438,6 +482,7 @@ pub unsafe extern "C" fn urlsph_read_field(
     with(simulation, |session| {
         let simulation = session.simulation()?;
         let f = field_at(field)?;
+        simulation.has_field(f.field)?;
         let needed = simulation.particle_count() * f.components;
         // SAFETY: the caller's pointer, as the header's preamble demands.
         let out = unsafe { buffer(values, capacity, needed, "values")? };
@@ -551,7 +596,7 @@ pub unsafe extern "C" fn urlsph_get_probe_info(
     })
 }
 
-/// Displacement and velocity of a probe now.
+/// Displacement, velocity and temperature of a probe now.
 ///
 /// - `probe`: index of the probe.
 /// - `motion`, `motion_size`: receives them; the size of the struct.
@@ -571,6 +616,7 @@ pub unsafe extern "C" fn urlsph_get_probe_motion(
         let value = urlsph_probe_motion {
             displacement: m.displacement,
             velocity: m.velocity,
+            temperature: m.temperature.unwrap_or(0.0),
         };
         // SAFETY: the caller's pointer, as the header's preamble demands.
         unsafe { put_struct(motion, motion_size, &value, "motion") }

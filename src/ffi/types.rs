@@ -242,6 +242,10 @@ pub struct urlsph_field_info {
     pub configuration: urlsph_configuration,
     /// 1 if `urlsph_get_view` gives it without a copy, otherwise 0.
     pub has_view: i32,
+    /// 1 if this simulation has it; 0 if the scene lacks what it takes, such as heat or plasticity.
+    pub is_present: i32,
+    /// Always 0.
+    pub reserved: i32,
 }
 
 /// A probe: a named point of the body.
@@ -262,7 +266,7 @@ pub struct urlsph_input_info {
     pub patch: usize,
     /// Number of the patch's particles.
     pub particles: usize,
-    /// Components of one value: 3, or 1 for a pressure.
+    /// Components of one value: 3 of a traction or a velocity, otherwise 1.
     pub components: usize,
     /// What is set.
     pub quantity: urlsph_quantity,
@@ -292,13 +296,13 @@ pub struct urlsph_view {
     pub generation: u64,
 }
 
-/// Energies [J].
+/// Energies [J] and entropies [J/K]. What the scene does not have is 0.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct urlsph_energies {
     /// Kinetic energy.
     pub kinetic: f64,
-    /// Strain energy.
+    /// Strain energy; with heat the mechanical part of the internal energy.
     pub strain: f64,
     /// Work of tractions, pressures, body force and moving supports since time 0.
     pub external_work: f64,
@@ -306,8 +310,25 @@ pub struct urlsph_energies {
     pub numerical_dissipation: f64,
     /// Energy taken out by the angular-momentum projection since time 0, of either sign.
     pub projection: f64,
-    /// kinetic + strain + numerical_dissipation + projection - external_work - initial energy.
+    /// What is stored and dissipated less what was supplied and the initial energy: kinetic + strain +
+    /// thermal + plastic work that did not become heat + numerical_dissipation +
+    /// contact_dissipation + projection - external_work - heat_in - initial energy.
     pub closure_error: f64,
+    /// Thermal part of the internal energy, from the reference temperature on.
+    pub thermal: f64,
+    /// Heat from sources, heat fluxes, convection and prescribed temperatures since time 0.
+    pub heat_in: f64,
+    /// Plastic work since time 0. With heat its part that became heat is in `thermal` as well.
+    pub plastic_work: f64,
+    /// Ballistic energy, kinetic + strain + thermal - reference temperature x entropy: without
+    /// supply from outside it never rises.
+    pub ballistic: f64,
+    /// Entropy [J/K].
+    pub entropy: f64,
+    /// Entropy produced by conduction and plastic flow since time 0 [J/K]: never falls.
+    pub entropy_production: f64,
+    /// Kinetic energy lost in inelastic contact since time 0: never falls.
+    pub contact_dissipation: f64,
 }
 
 /// Momenta of the whole body.
@@ -334,7 +355,20 @@ pub struct urlsph_resultant {
     pub mean_velocity: [f64; 3],
 }
 
-/// Motion of a probe, interpolated between the particles around it.
+/// Heat through a patch, and its temperature.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct urlsph_heat_resultant {
+    /// Heat that flows into the body through this patch [W]: flux, convection, and what a prescribed
+    /// temperature draws.
+    pub heat_flow: f64,
+    /// Mean absolute temperature, weighted with the initial areas [K].
+    pub mean_temperature: f64,
+    /// Highest absolute temperature of its particles [K].
+    pub maximum_temperature: f64,
+}
+
+/// Motion of a probe and its temperature, interpolated between the particles around it.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct urlsph_probe_motion {
@@ -342,6 +376,8 @@ pub struct urlsph_probe_motion {
     pub displacement: [f64; 3],
     /// Velocity [m/s].
     pub velocity: [f64; 3],
+    /// Absolute temperature [K]; 0 of a body without heat.
+    pub temperature: f64,
 }
 
 const fn size_of_field<S, F>(_: fn(&S) -> &F) -> usize {
@@ -373,5 +409,6 @@ versioned! {
     urlsph_energies.closure_error;
     urlsph_momenta.angular;
     urlsph_resultant.mean_velocity;
+    urlsph_heat_resultant.maximum_temperature;
     urlsph_probe_motion.velocity;
 }

@@ -56,7 +56,7 @@ impl Recorder {
     pub fn create(folder: impl Into<PathBuf>, simulation: &Simulation) -> Result<Self> {
         let folder = folder.into();
         let scene = simulation.scene();
-        let fields = selected_fields(scene)?;
+        let fields = selected_fields(simulation)?;
         let field_folder = folder.join("fields");
         fs::create_dir_all(&folder).map_err(|cause| io_error("create", &folder, &cause))?;
         remove_earlier(&folder, &field_folder)?;

@@ -6,14 +6,13 @@
 
 use std::borrow::Cow;
 
-use crate::boundary::Patch;
+use crate::boundary::{Input, Patch, Quantity};
 use crate::error::{Error, Result};
 use crate::fields::{Field, FieldInfo};
-use crate::ledger::{Energies, Momenta, Resultant};
-use crate::scene::Scene;
+use crate::ledger::{Energies, HeatResultant, Momenta, Resultant};
 use crate::simulation::{ProbeMotion, Simulation};
 
-/// Fields that are written when the scene names none.
+/// Fields that are written when the scene names none, with those of [`OPTIONAL_FIELDS`] that it has.
 pub const DEFAULT_FIELDS: [Field; 5] = [
     Field::Displacement,
     Field::Velocity,
@@ -21,6 +20,9 @@ pub const DEFAULT_FIELDS: [Field; 5] = [
     Field::Pressure,
     Field::Jacobian,
 ];
+
+/// Fields that are written as well, where the scene has them.
+pub const OPTIONAL_FIELDS: [Field; 2] = [Field::Temperature, Field::EquivalentPlasticStrain];
 
 /// One reported quantity: a number, a vector, or an array with one row per particle.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,23 +45,23 @@ pub struct OutputVariable {
 enum Source {
     ProbeDisplacement(usize),
     ProbeVelocity(usize),
-    KineticEnergy,
-    StrainEnergy,
-    ExternalWork,
-    NumericalDissipation,
-    ContactDissipation,
-    Projection,
-    ClosureError,
+    ProbeTemperature(usize),
+    /// Index into [`ENERGIES`].
+    Energy(usize),
     LinearMomentum,
     AngularMomentum,
     PatchForce(usize),
     PatchMoment(usize),
     PatchDisplacement(usize),
     PatchVelocity(usize),
+    PatchHeatFlow(usize),
+    PatchMeanTemperature(usize),
+    PatchMaximumTemperature(usize),
+    /// Whether it changes with an input at once.
+    StableStep(bool),
     ContactForce(usize),
     ContactImpulse(usize),
     ContactParticles(usize),
-    StableStep,
     Steps,
     PatchInitialPositions(usize),
     PatchAreas(usize),
@@ -97,6 +99,8 @@ impl OutputVariable {
             self.source,
             Source::PatchForce(_)
                 | Source::PatchMoment(_)
+                | Source::PatchHeatFlow(_)
+                | Source::StableStep(true)
                 | Source::ContactForce(_)
                 | Source::Field(Field::NodalForce)
         )
@@ -108,6 +112,9 @@ impl OutputVariable {
             | Source::PatchMoment(p)
             | Source::PatchDisplacement(p)
             | Source::PatchVelocity(p)
+            | Source::PatchHeatFlow(p)
+            | Source::PatchMeanTemperature(p)
+            | Source::PatchMaximumTemperature(p)
             | Source::PatchInitialPositions(p)
             | Source::PatchAreas(p)
             | Source::PatchNormals(p)
@@ -151,23 +158,34 @@ pub fn name_part(name: &str) -> Cow<'_, str> {
     }
 }
 
-/// Fields that the scene's `output.fields` names, or [`DEFAULT_FIELDS`].
+/// Fields that the scene's `output.fields` names, or [`DEFAULT_FIELDS`] and those of
+/// [`OPTIONAL_FIELDS`] that it has.
 ///
 /// # Errors
-/// [`Code::InvalidScene`](crate::Code::InvalidScene) with the path of an unknown name.
-pub fn selected_fields(scene: &Scene) -> Result<Vec<Field>> {
-    let Some(names) = &scene.output.fields else {
-        return Ok(DEFAULT_FIELDS.to_vec());
+/// [`Code::InvalidScene`](crate::Code::InvalidScene) with the path of a name that is unknown, or of a
+/// field that the scene lacks.
+pub fn selected_fields(simulation: &Simulation) -> Result<Vec<Field>> {
+    let present = |field: &Field| simulation.has_field(*field).is_ok();
+    let Some(names) = &simulation.scene().output.fields else {
+        let optional = OPTIONAL_FIELDS.into_iter().filter(present);
+        return Ok(DEFAULT_FIELDS.into_iter().chain(optional).collect());
     };
     let mut fields = Vec::with_capacity(names.len());
     for (i, name) in names.iter().enumerate() {
+        let path = || format!("output.fields[{i}]");
         let info = FieldInfo::by_name(name).ok_or_else(|| {
-            let known: Vec<_> = crate::FIELDS.iter().map(|f| f.name).collect();
+            let known: Vec<_> = (crate::FIELDS.iter())
+                .filter(|f| present(&f.field))
+                .map(|f| f.name)
+                .collect();
             Error::scene(
-                format!("output.fields[{i}]"),
+                path(),
                 format!("there is no field {name:?}; there are {}", known.join(", ")),
             )
         })?;
+        simulation
+            .has_field(info.field)
+            .map_err(|e| Error::scene(path(), e.message()).at_field(info.name))?;
         if !fields.contains(&info.field) {
             fields.push(info.field);
         }
@@ -185,8 +203,122 @@ pub fn reported_patches(simulation: &Simulation) -> Vec<usize> {
         .collect()
 }
 
+/// What a scene needs to have a quantity.
+#[derive(Debug, Clone, Copy)]
+enum Needs {
+    Nothing,
+    Heat,
+    Plasticity,
+    Contact,
+}
+
+/// A number of the ledger: what it needs, name, unit, description, value.
+type LedgerRow = (
+    Needs,
+    &'static str,
+    &'static str,
+    &'static str,
+    fn(&Energies) -> f64,
+);
+
+const ENERGIES: &[LedgerRow] = &[
+    (
+        Needs::Nothing,
+        "energy.kinetic",
+        "J",
+        "Kinetic energy",
+        |e| e.kinetic,
+    ),
+    (
+        Needs::Nothing,
+        "energy.strain",
+        "J",
+        "Strain energy; with heat the mechanical part of the internal energy",
+        |e| e.strain,
+    ),
+    (
+        Needs::Heat,
+        "energy.thermal",
+        "J",
+        "Thermal part of the internal energy, from the reference temperature on",
+        |e| e.thermal,
+    ),
+    (
+        Needs::Nothing,
+        "energy.external_work",
+        "J",
+        "Work of loads, body force and moving supports since time 0",
+        |e| e.external_work,
+    ),
+    (
+        Needs::Heat,
+        "energy.heat_in",
+        "J",
+        "Heat from sources and through the boundary since time 0",
+        |e| e.heat_in,
+    ),
+    (
+        Needs::Plasticity,
+        "energy.plastic_work",
+        "J",
+        "Plastic work since time 0",
+        |e| e.plastic_work,
+    ),
+    (
+        Needs::Nothing,
+        "energy.numerical_dissipation",
+        "J",
+        "Energy dissipated by the scheme since time 0",
+        |e| e.numerical_dissipation,
+    ),
+    (
+        Needs::Contact,
+        "energy.contact_dissipation",
+        "J",
+        "Kinetic energy lost in inelastic contact since time 0",
+        |e| e.contact_dissipation,
+    ),
+    (
+        Needs::Nothing,
+        "energy.projection",
+        "J",
+        "Energy taken out by the angular-momentum projection since time 0",
+        |e| e.projection,
+    ),
+    (
+        Needs::Heat,
+        "energy.ballistic",
+        "J",
+        "Ballistic energy: stored energy less reference temperature times entropy",
+        |e| e.ballistic,
+    ),
+    (
+        Needs::Nothing,
+        "energy.closure_error",
+        "J",
+        "Error of the energy balance: stored and dissipated less supplied and initial energy",
+        |e| e.closure_error,
+    ),
+    (
+        Needs::Heat,
+        "entropy.total",
+        "J/K",
+        "Entropy of the body",
+        |e| e.entropy,
+    ),
+    (
+        Needs::Heat,
+        "entropy.production",
+        "J/K",
+        "Entropy produced by conduction and plastic flow since time 0",
+        |e| e.entropy_production,
+    ),
+];
+
 /// Quantities of probes, patches and the whole body, in the order of the columns of a history.
 pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
+    let has = |field| simulation.has_field(field).is_ok();
+    let (heat, plasticity) = (has(Field::Temperature), has(Field::EquivalentPlasticStrain));
     let mut list = Vec::new();
     let mut add = |name: String, unit, components, description: String, source| {
         list.push(OutputVariable {
@@ -214,42 +346,32 @@ pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
             format!("Velocity of probe {name}"),
             Source::ProbeVelocity(i),
         );
+        if heat {
+            add(
+                format!("probe.{part}.temperature"),
+                "K",
+                1,
+                format!("Absolute temperature of probe {name}"),
+                Source::ProbeTemperature(i),
+            );
+        }
     }
-    let energies = [
-        ("kinetic", "Kinetic energy", Source::KineticEnergy),
-        ("strain", "Strain energy", Source::StrainEnergy),
-        (
-            "external_work",
-            "Work of loads, body force and moving supports since time 0",
-            Source::ExternalWork,
-        ),
-        (
-            "numerical_dissipation",
-            "Energy dissipated by the scheme since time 0",
-            Source::NumericalDissipation,
-        ),
-        (
-            "projection",
-            "Energy taken out by the angular-momentum projection since time 0",
-            Source::Projection,
-        ),
-        (
-            "closure_error",
-            "Error of the energy balance: stored and dissipated less supplied and initial energy",
-            Source::ClosureError,
-        ),
-    ];
-    for (name, text, source) in energies {
-        add(format!("energy.{name}"), "J", 1, text.to_owned(), source);
-    }
-    if simulation.contact_names().next().is_some() {
-        add(
-            "energy.contact_dissipation".to_owned(),
-            "J",
-            1,
-            "Kinetic energy lost in inelastic contact since time 0".to_owned(),
-            Source::ContactDissipation,
-        );
+    for (row, &(needs, name, unit, text, _)) in ENERGIES.iter().enumerate() {
+        let has = match needs {
+            Needs::Nothing => true,
+            Needs::Heat => heat,
+            Needs::Plasticity => plasticity,
+            Needs::Contact => simulation.contact_names().next().is_some(),
+        };
+        if has {
+            add(
+                name.to_owned(),
+                unit,
+                1,
+                text.to_owned(),
+                Source::Energy(row),
+            );
+        }
     }
     add(
         "momentum.linear".to_owned(),
@@ -303,6 +425,38 @@ pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
                 source,
             );
         }
+        if !heat {
+            continue;
+        }
+        let quantities = [
+            (
+                "heat_flow",
+                "W",
+                "Heat that flows into the body through",
+                Source::PatchHeatFlow(p),
+            ),
+            (
+                "mean_temperature",
+                "K",
+                "Area-weighted mean temperature of",
+                Source::PatchMeanTemperature(p),
+            ),
+            (
+                "maximum_temperature",
+                "K",
+                "Highest temperature of",
+                Source::PatchMaximumTemperature(p),
+            ),
+        ];
+        for (quantity, unit, text, source) in quantities {
+            add(
+                format!("boundary.{part}.{quantity}"),
+                unit,
+                1,
+                format!("{text} patch {name}"),
+                source,
+            );
+        }
     }
     for (wall, name) in simulation.contact_names().enumerate() {
         let part = name_part(name);
@@ -339,12 +493,14 @@ pub fn outputs(simulation: &Simulation) -> Vec<OutputVariable> {
             );
         }
     }
+    let limits = |i: &Input| i.quantity == Quantity::ConvectionCoefficient;
+    let answers = simulation.inputs().iter().any(limits);
     add(
         "stable_step".to_owned(),
         "s",
         1,
         "Largest stable time step from the present state".to_owned(),
-        Source::StableStep,
+        Source::StableStep(answers),
     );
     add(
         "steps".to_owned(),
@@ -403,7 +559,15 @@ pub fn arrays(simulation: &Simulation) -> Result<Vec<OutputVariable>> {
                 Source::PatchField(p, Field::Velocity),
             ),
         ];
-        for (quantity, unit, components, text, source) in quantities {
+        let temperature = (simulation.has_field(Field::Temperature).is_ok()).then_some((
+            "particle_temperature",
+            "K",
+            1,
+            "Absolute temperatures",
+            Source::PatchField(p, Field::Temperature),
+        ));
+        for (quantity, unit, components, text, source) in quantities.into_iter().chain(temperature)
+        {
             list.push(OutputVariable {
                 name: format!("boundary.{part}.{quantity}"),
                 unit,
@@ -414,7 +578,7 @@ pub fn arrays(simulation: &Simulation) -> Result<Vec<OutputVariable>> {
             });
         }
     }
-    for field in selected_fields(simulation.scene())? {
+    for field in selected_fields(simulation)? {
         let info = field.info();
         list.push(OutputVariable {
             name: format!("field.{}", info.name),
@@ -435,6 +599,8 @@ pub struct Reader {
     momenta: Option<Momenta>,
     /// By patch.
     resultants: Vec<Option<Resultant>>,
+    /// By patch.
+    heat: Vec<Option<HeatResultant>>,
     /// By probe.
     probes: Vec<Option<ProbeMotion>>,
     /// By field: all values, kept for the patches and elements that share them.
@@ -471,17 +637,14 @@ impl Reader {
                 out.copy_from_slice(&self.probe(simulation, i).displacement);
             }
             Source::ProbeVelocity(i) => out.copy_from_slice(&self.probe(simulation, i).velocity),
-            Source::KineticEnergy => out[0] = self.energies(simulation).kinetic,
-            Source::StrainEnergy => out[0] = self.energies(simulation).strain,
-            Source::ExternalWork => out[0] = self.energies(simulation).external_work,
-            Source::ContactDissipation => {
-                out[0] = self.energies(simulation).contact_dissipation;
+            Source::ProbeTemperature(i) => {
+                let temperature = self.probe(simulation, i).temperature;
+                out[0] = temperature.ok_or_else(|| no_heat(variable))?;
             }
-            Source::NumericalDissipation => {
-                out[0] = self.energies(simulation).numerical_dissipation;
+            Source::Energy(row) => {
+                let (.., value) = ENERGIES[row];
+                out[0] = value(&self.energies(simulation));
             }
-            Source::Projection => out[0] = self.energies(simulation).projection,
-            Source::ClosureError => out[0] = self.energies(simulation).closure_error,
             Source::LinearMomentum => out.copy_from_slice(&self.momenta(simulation).linear),
             Source::AngularMomentum => out.copy_from_slice(&self.momenta(simulation).angular),
             Source::PatchForce(p) => out.copy_from_slice(&self.resultant(simulation, p).force),
@@ -492,10 +655,17 @@ impl Reader {
             Source::PatchVelocity(p) => {
                 out.copy_from_slice(&self.resultant(simulation, p).mean_velocity);
             }
+            Source::PatchHeatFlow(p) => out[0] = self.heat(simulation, p, variable)?.heat_flow,
+            Source::PatchMeanTemperature(p) => {
+                out[0] = self.heat(simulation, p, variable)?.mean_temperature;
+            }
+            Source::PatchMaximumTemperature(p) => {
+                out[0] = self.heat(simulation, p, variable)?.maximum_temperature;
+            }
+            Source::StableStep(_) => out[0] = simulation.stable_step(),
             Source::ContactForce(w) => out.copy_from_slice(&simulation.contact(w).force),
             Source::ContactImpulse(w) => out.copy_from_slice(&simulation.contact(w).impulse),
             Source::ContactParticles(w) => out[0] = simulation.contact(w).particles as f64,
-            Source::StableStep => out[0] = simulation.stable_step(),
             // Exact up to 2^53 steps.
             Source::Steps => out[0] = simulation.steps() as f64,
             Source::PatchAreas(p) => out.copy_from_slice(&simulation.patches()[p].areas),
@@ -521,6 +691,19 @@ impl Reader {
 
     fn resultant(&mut self, simulation: &Simulation, patch: usize) -> Resultant {
         *entry(&mut self.resultants, patch).get_or_insert_with(|| simulation.resultant(patch))
+    }
+
+    fn heat(
+        &mut self,
+        simulation: &Simulation,
+        patch: usize,
+        variable: &OutputVariable,
+    ) -> Result<HeatResultant> {
+        let entry = entry(&mut self.heat, patch);
+        if entry.is_none() {
+            *entry = simulation.heat_resultant(patch);
+        }
+        entry.ok_or_else(|| no_heat(variable))
     }
 
     fn probe(&mut self, simulation: &Simulation, probe: usize) -> ProbeMotion {
@@ -553,6 +736,14 @@ impl Reader {
         }
         Ok(())
     }
+}
+
+/// The variable comes from a simulation with heat, the one that is read has none.
+fn no_heat(variable: &OutputVariable) -> Error {
+    Error::argument(format!(
+        "{} is of another simulation: this body has no temperature",
+        variable.name
+    ))
 }
 
 fn entry<T>(list: &mut Vec<Option<T>>, index: usize) -> &mut Option<T> {

@@ -10,7 +10,8 @@ use xshell::{Shell, cmd};
 use crate::tally::Tally;
 use crate::{header, install, project, venv, wheel};
 
-const SCENE: &str = "ffi-tests/scene.json";
+/// A column, and a metal with heat.
+const SCENES: [&str; 2] = ["ffi-tests/scene.json", "ffi-tests/metal.json"];
 
 /// `cargo xtask ffi-tests`: these alone.
 pub fn run(sh: &Shell) -> Result<()> {
@@ -158,7 +159,7 @@ impl Setup {
                 let options = options.each_ref().map(String::as_str);
                 let build = self.cmake(sh, "ffi-tests", &name, &options)?;
                 for program in ["api", "wrapper"] {
-                    tally += self.run(&build.join(program), &[SCENE])?;
+                    tally += self.run(&build.join(program), &SCENES)?;
                 }
             }
         }

@@ -28,6 +28,7 @@ from ._library import library_path, library_version
 from ._simulation import (
     Energies,
     Field,
+    HeatResultant,
     Input,
     Momenta,
     Patch,
@@ -48,6 +49,7 @@ __all__ = [
     "Energies",
     "Error",
     "Field",
+    "HeatResultant",
     "Input",
     "InternalError",
     "InvalidArgumentError",

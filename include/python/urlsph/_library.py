@@ -113,6 +113,8 @@ class FieldInfoStruct(Structure):
         ("components", c_size_t),
         ("configuration", c_int32),
         ("has_view", c_int32),
+        ("is_present", c_int32),
+        ("reserved", c_int32),
     ]
 
 
@@ -149,6 +151,13 @@ class EnergiesStruct(Structure):
         ("numerical_dissipation", c_double),
         ("projection", c_double),
         ("closure_error", c_double),
+        ("thermal", c_double),
+        ("heat_in", c_double),
+        ("plastic_work", c_double),
+        ("ballistic", c_double),
+        ("entropy", c_double),
+        ("entropy_production", c_double),
+        ("contact_dissipation", c_double),
     ]
 
 
@@ -165,8 +174,20 @@ class ResultantStruct(Structure):
     ]
 
 
+class HeatResultantStruct(Structure):
+    _fields_ = [
+        ("heat_flow", c_double),
+        ("mean_temperature", c_double),
+        ("maximum_temperature", c_double),
+    ]
+
+
 class ProbeMotionStruct(Structure):
-    _fields_ = [("displacement", c_double * 3), ("velocity", c_double * 3)]
+    _fields_ = [
+        ("displacement", c_double * 3),
+        ("velocity", c_double * 3),
+        ("temperature", c_double),
+    ]
 
 
 _HANDLE = c_void_p
@@ -206,6 +227,7 @@ _SIGNATURES = {
     "urlsph_read_patch_areas": _SET,
     "urlsph_read_patch_normals": _SET,
     "urlsph_get_resultant": _get(ResultantStruct, c_size_t),
+    "urlsph_get_heat_resultant": _get(HeatResultantStruct, c_size_t),
     "urlsph_find_field": _FIND,
     "urlsph_get_field_info": _get(FieldInfoStruct, c_size_t),
     "urlsph_read_field": _SET,
@@ -218,6 +240,9 @@ _SIGNATURES = {
     "urlsph_set_traction": _SET,
     "urlsph_set_pressure": _SET,
     "urlsph_set_velocity": _SET,
+    "urlsph_set_heat_flux": _SET,
+    "urlsph_set_temperature": _SET,
+    "urlsph_set_convection": [*_SET, POINTER(c_double), c_size_t],
     "urlsph_read_input": [
         _HANDLE,
         c_size_t,

@@ -18,7 +18,15 @@ from . import _library as c
 from ._errors import StaleViewError, Status
 from ._library import check, lib
 
-_QUANTITIES = {"traction": 1, "pressure": 2, "velocity": 3}
+_QUANTITIES = {
+    "traction": 1,
+    "pressure": 2,
+    "velocity": 3,
+    "heat_flux": 4,
+    "temperature": 5,
+    "convection_coefficient": 6,
+    "ambient_temperature": 7,
+}
 _QUANTITY_NAMES = {number: name for name, number in _QUANTITIES.items()}
 _CONFIGURATIONS = {1: "initial", 2: "current", 3: "two_point"}
 _LOG_LEVELS = {1: "error", 3: "info"}
@@ -36,7 +44,7 @@ class Progress(NamedTuple):
 
 
 class Energies(NamedTuple):
-    """Energies [J]; see ``urlsph_energies``."""
+    """Energies [J] and entropies [J/K]; see ``urlsph_energies``. What a scene lacks is 0."""
 
     kinetic: float
     strain: float
@@ -44,6 +52,13 @@ class Energies(NamedTuple):
     numerical_dissipation: float
     projection: float
     closure_error: float
+    thermal: float
+    heat_in: float
+    plastic_work: float
+    ballistic: float
+    entropy: float
+    entropy_production: float
+    contact_dissipation: float
 
 
 class Momenta(NamedTuple):
@@ -62,11 +77,20 @@ class Resultant(NamedTuple):
     mean_velocity: np.ndarray  #: [m/s]
 
 
+class HeatResultant(NamedTuple):
+    """Heat through a patch, and its absolute temperature."""
+
+    heat_flow: float  #: into the body [W]
+    mean_temperature: float  #: weighted with the initial areas [K]
+    maximum_temperature: float  #: of its particles [K]
+
+
 class ProbeMotion(NamedTuple):
-    """Motion of a probe."""
+    """Motion of a probe, and its temperature."""
 
     displacement: np.ndarray  #: [m]
     velocity: np.ndarray  #: [m/s]
+    temperature: Optional[float]  #: absolute [K]; None of a body without heat
 
 
 class Patch(NamedTuple):
@@ -90,6 +114,7 @@ class Field(NamedTuple):
     configuration: str  #: "initial", "current" or "two_point"
     description: str
     has_view: bool  #: whether :meth:`Simulation.view` gives it
+    is_present: bool  #: whether the scene has it: some take heat or plasticity
 
 
 class Probe(NamedTuple):
@@ -104,7 +129,7 @@ class Input(NamedTuple):
     """A condition that the scene leaves to the outside."""
 
     patch: str
-    quantity: str  #: "traction", "pressure" or "velocity"
+    quantity: str  #: "traction", "pressure", "velocity", "heat_flux", "temperature", ...
     components: int
     particles: int  #: of the patch
     per_particle: bool  #: as the scene declares it; either form can be set
@@ -513,6 +538,12 @@ class Simulation:
         r = self._struct(lib.urlsph_get_resultant, c.ResultantStruct, index)
         return Resultant(*(_array(getattr(r, name)) for name in Resultant._fields))
 
+    def heat_resultant(self, patch: str) -> HeatResultant:
+        """Heat flow through a patch, its mean and maximum temperature; only of a body with heat."""
+        index = self._find(lib.urlsph_find_patch, patch)
+        r = self._struct(lib.urlsph_get_heat_resultant, c.HeatResultantStruct, index)
+        return HeatResultant(*(getattr(r, name) for name in HeatResultant._fields))
+
     # Fields.
 
     @property
@@ -531,6 +562,7 @@ class Simulation:
                     _CONFIGURATIONS.get(info.configuration, str(info.configuration)),
                     info.description.decode(),
                     bool(info.has_view),
+                    bool(info.is_present),
                 )
             self._fields = fields
         return self._fields
@@ -579,10 +611,10 @@ class Simulation:
         return self._probes
 
     def probe(self, name: str) -> ProbeMotion:
-        """Displacement and velocity of a probe now."""
+        """Displacement, velocity and temperature of a probe now."""
         index = self._find(lib.urlsph_find_probe, name)
         m = self._struct(lib.urlsph_get_probe_motion, c.ProbeMotionStruct, index)
-        return ProbeMotion(_array(m.displacement), _array(m.velocity))
+        return ProbeMotion(_array(m.displacement), _array(m.velocity), m.temperature or None)
 
     # Inputs.
 
@@ -631,10 +663,38 @@ class Simulation:
         """Sets a velocity [m/s]: 3 numbers, or particles x 3."""
         self._set(lib.urlsph_set_velocity, patch, values)
 
-    def _set(self, function, patch: str, values: npt.ArrayLike) -> None:
+    def set_heat_flux(self, patch: str, values: npt.ArrayLike) -> None:
+        """Sets a heat flux into the body per unit initial area [W/m^2]: a number, or one per
+        particle."""
+        self._set(lib.urlsph_set_heat_flux, patch, values)
+
+    def set_temperature(self, patch: str, values: npt.ArrayLike) -> None:
+        """Sets an absolute temperature [K]: a number, or one per particle. The next step takes it."""
+        self._set(lib.urlsph_set_temperature, patch, values)
+
+    def set_convection(
+        self,
+        patch: str,
+        *,
+        coefficient: Optional[npt.ArrayLike] = None,
+        ambient_temperature: Optional[npt.ArrayLike] = None,
+    ) -> None:
+        """Sets the convection, both or one of them: each a number, or one per particle.
+
+        :param coefficient: heat transfer coefficient per unit initial area [W/(m^2 K)].
+        :param ambient_temperature: absolute temperature of the surroundings [K].
+        """
+        self._set(lib.urlsph_set_convection, patch, coefficient, ambient_temperature)
+
+    def _set(self, function, patch: str, *values: Optional[npt.ArrayLike]) -> None:
         index = self._find(lib.urlsph_find_patch, patch)
-        array = np.ascontiguousarray(values, dtype=np.float64)
-        self._change(function, index, _pointer(array, c_double), array.size)
+        arguments: List[Any] = []
+        # Holds the memory during the call.
+        arrays = [None if v is None else np.ascontiguousarray(v, dtype=np.float64) for v in values]
+        for array in arrays:
+            pointer = None if array is None else _pointer(array, c_double)
+            arguments += [pointer, 0 if array is None else array.size]
+        self._change(function, index, *arguments)
 
     # State.
 

@@ -188,20 +188,38 @@ fn summary(
             simulation.threads()
         ),
     );
+    let stored = |e: &Energies| e.kinetic + e.strain + e.thermal;
+    // What the scene does not have stays 0 and is left out.
+    let optional = |value: f64| (value != 0.0).then_some(value);
     for (name, value) in [
-        ("initial energy", initial.kinetic + initial.strain),
-        ("kinetic energy", energies.kinetic),
-        ("strain energy", energies.strain),
-        ("external work", energies.external_work),
-        ("numerical dissipation", energies.numerical_dissipation),
-        ("taken by projection", energies.projection),
+        ("initial energy", Some(stored(&initial))),
+        ("kinetic energy", Some(energies.kinetic)),
+        ("strain energy", Some(energies.strain)),
+        ("thermal energy", optional(energies.thermal)),
+        ("external work", Some(energies.external_work)),
+        ("heat supplied", optional(energies.heat_in)),
+        ("plastic work", optional(energies.plastic_work)),
+        (
+            "numerical dissipation",
+            Some(energies.numerical_dissipation),
+        ),
+        ("taken by projection", Some(energies.projection)),
     ] {
-        line(name, format!("{value:>14.6e} J"));
+        if let Some(value) = value {
+            line(name, format!("{value:>14.6e} J"));
+        }
     }
     // A body at rest without loads has no energy to compare with.
-    let scale = (initial.kinetic + initial.strain)
-        .max(energies.external_work.abs())
-        .max(energies.kinetic + energies.strain);
+    let scale = [
+        stored(&initial),
+        energies.external_work,
+        energies.heat_in,
+        energies.kinetic + energies.strain,
+        energies.thermal,
+    ]
+    .map(f64::abs)
+    .into_iter()
+    .fold(0.0, f64::max);
     let share = if scale > 0.0 {
         format!(
             " ({:.1e} of the largest energy)",
