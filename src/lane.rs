@@ -418,8 +418,10 @@ pub trait Work {
     fn run<T: Lane>(self, token: T::Token) -> Self::Output;
 }
 
+#[cfg(not(target_arch = "x86_64"))]
 struct Dispatch<W>(W);
 
+#[cfg(not(target_arch = "x86_64"))]
 impl<W: Work> pulp::WithSimd for Dispatch<W> {
     type Output = W::Output;
     #[inline(always)]
@@ -429,22 +431,40 @@ impl<W: Work> pulp::WithSimd for Dispatch<W> {
 }
 
 /// Runs `work` on the widest vectors that this processor has.
+#[cfg(not(target_arch = "x86_64"))]
 pub fn vectorised<W: Work>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(Dispatch(work))
+}
+
+/// Runs `work` on the widest vectors that this processor has. One without AVX2 gets one particle at a
+/// time: vectors emulated on single numbers would be most of the library's code.
+#[cfg(target_arch = "x86_64")]
+pub fn vectorised<W: Work>(work: W) -> W::Output {
+    if let Some(avx512) = pulp::x86::V4::try_new() {
+        avx512.vectorize(Inside(work, avx512))
+    } else if let Some(avx2) = pulp::x86::V3::try_new() {
+        avx2.vectorize(Inside(work, avx2))
+    } else {
+        work.run::<f64>(())
+    }
+}
+
+/// Work with the vectors that it is to run on.
+#[cfg(target_arch = "x86_64")]
+struct Inside<W, S>(W, S);
+
+#[cfg(target_arch = "x86_64")]
+impl<W: Work, S: Simd> pulp::NullaryFnOnce for Inside<W, S> {
+    type Output = W::Output;
+    #[inline(always)]
+    fn call(self) -> W::Output {
+        self.0.run::<Wide<S>>(self.1)
+    }
 }
 
 /// Runs `work` on the AVX2 instructions, for the tests; `None` where the processor has none.
 #[cfg(all(test, target_arch = "x86_64"))]
 pub fn on_avx2<W: Work>(work: W) -> Option<W::Output> {
-    use pulp::WithSimd;
-    struct Inside<W>(W, pulp::x86::V3);
-    impl<W: Work> pulp::NullaryFnOnce for Inside<W> {
-        type Output = W::Output;
-        #[inline(always)]
-        fn call(self) -> W::Output {
-            Dispatch(self.0).with_simd(self.1)
-        }
-    }
     let avx2 = pulp::x86::V3::try_new()?;
     Some(avx2.vectorize(Inside(work, avx2)))
 }

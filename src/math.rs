@@ -361,7 +361,8 @@ pub fn eigen<T: Lane>(a: &Sym3<T>) -> (Vec3<T>, Mat3<T>) {
     const SWEEPS: usize = 6;
     let one = a[0].of(1.0);
     let (mut m, mut v) = (full(a), identity(a[0].token()));
-    for _ in 0..SWEEPS {
+    // Not unrolled: it is seldom needed, and six copies would take long to compile.
+    for _ in 0..std::hint::black_box(SWEEPS) {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let r = 3 - p - q;
             // The smaller root of t^2 + 2 t cot(2 phi) - 1; t = 0 where there is nothing to rotate.

@@ -1,7 +1,10 @@
 //! Formulations: state fields, kinematics and rates. They never name a law.
 
+mod advance;
 pub mod angular_momentum;
 mod conduction;
+mod heat;
+mod laws;
 pub mod limiter;
 mod passes;
 pub mod riemann;

@@ -5,7 +5,7 @@ use super::riemann::{self, Pair, WaveSpeeds};
 use super::url::{Breakdown, Scratch, State, Trouble};
 use crate::lane::{Lane, PerSlot, SLICE, Work};
 use crate::layout::Array;
-use crate::material::{Deformation, Material, Thermal};
+use crate::material::Deformation;
 use crate::math::*;
 use crate::reference::{PairVectors, Reference, load3, load9, store3, store9};
 
@@ -14,7 +14,7 @@ use crate::reference::{PairVectors, Reference, load3, load9, store3, store9};
 pub(super) struct Kinematics<'a> {
     pub(super) f: [&'a [f64]; 9],
     h: Option<[&'a [f64]; 9]>,
-    j: Option<&'a [f64]>,
+    pub(super) j: Option<&'a [f64]>,
     f_chi: Option<[&'a [f64]; 9]>,
     h_chi: Option<[&'a [f64]; 9]>,
     pub(super) j_chi: Option<&'a [f64]>,
@@ -60,18 +60,13 @@ impl<'a> Kinematics<'a> {
 }
 
 #[inline(always)]
-fn load_slab3<T: Lane>(token: T::Token, from: &[&mut [f64]; 3], at: usize) -> Vec3<T> {
+pub(super) fn load_slab3<T: Lane>(token: T::Token, from: &[&mut [f64]; 3], at: usize) -> Vec3<T> {
     let [a, b, c] = from;
     load3(token, &[a, b, c], at)
 }
 
 #[inline(always)]
-fn load7<T: Lane>(token: T::Token, from: &[&[f64]; 7], at: usize) -> [T; 7] {
-    std::array::from_fn(|c| T::load(token, from[c], at))
-}
-
-#[inline(always)]
-fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [f64]; 9], at: usize) -> Mat3<T> {
+pub(super) fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [f64]; 9], at: usize) -> Mat3<T> {
     let [a, b, c, d, e, f, g, h, i] = from;
     load9(token, &[a, b, c, d, e, f, g, h, i], at)
 }
@@ -127,186 +122,6 @@ pub(super) struct PointOutput<'a> {
     pub sigma_j: Option<&'a mut [f64]>,
     /// Temperature and the variable whose gradient drives conduction.
     pub theta: Option<[&'a mut [f64]; 2]>,
-}
-
-/// What particles store, summed over a slab.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stored {
-    /// Strain energy [J].
-    pub strain: f64,
-    /// Thermal energy [J].
-    pub thermal: f64,
-    /// Entropy [J/K].
-    pub entropy: f64,
-}
-
-/// What the law pass reads.
-#[derive(Clone, Copy)]
-pub(super) struct LawInputs<'a> {
-    pub kinematics: Kinematics<'a>,
-    pub reference: &'a Reference,
-    /// Entropy per unit initial volume, of a body with heat.
-    pub heat: Option<(&'a [f64], Thermal)>,
-    pub history: Option<[&'a [f64]; 7]>,
-    /// Time since the step's start [s].
-    pub elapsed: f64,
-}
-
-/// The law pass: stress, temperature and energy of one slab from the total deformation.
-///
-/// `HEAT` and `FLOW` tell when the loop is compiled whether the body has a temperature and whether
-/// the history is mapped.
-pub(super) struct Laws<'a, 'o, M, const HEAT: bool, const FLOW: bool> {
-    pub law: M,
-    pub inputs: LawInputs<'a>,
-    pub slab: usize,
-    pub out: &'o mut PointOutput<'a>,
-}
-
-impl<M: Material, const HEAT: bool, const FLOW: bool> Work for Laws<'_, '_, M, HEAT, FLOW> {
-    type Output = std::result::Result<Stored, Breakdown>;
-    #[inline(always)]
-    fn run<T: Lane>(self, token: T::Token) -> Self::Output {
-        let Self { law, out, .. } = self;
-        let LawInputs {
-            kinematics,
-            reference,
-            ..
-        } = self.inputs;
-        let volume = reference.volume.components()[0];
-        let density = T::splat(token, law.density());
-        let elapsed = T::splat(token, self.inputs.elapsed);
-        let [mut strain, mut heat, mut entropy] = [PerSlot::new(0.0); 3];
-        let mut admissible = PerSlot::new(1.0);
-        let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
-        let infinity = T::splat(token, f64::INFINITY);
-        for (at, a) in lanes_of::<T>(reference, self.slab) {
-            let total = kinematics.total::<T>(token, a);
-            let v_r = T::load(token, volume, a);
-            let mut history = match &self.inputs.history {
-                Some(history) if M::HISTORY => load7(token, history, a),
-                _ => [zero; 7],
-            };
-            let mut theta = zero;
-            let mut warmth = None;
-            if HEAT && let Some((eta, thermal)) = self.inputs.heat {
-                let eta = T::load(token, eta, a);
-                let w = thermal.warmth(&total, eta);
-                theta = w.theta;
-                warmth = Some((thermal, w, eta));
-            }
-            let mut stress = law.stress::<T, FLOW>(&total, theta, &mut history, elapsed);
-            // 1 where J, det F and the temperature are positive and finite, else 0. A comparison
-            // with NaN is false.
-            let det = dot(total.f[0], cofactor(&total.f)[0]);
-            let mut good = (infinity - det).if_positive(det.if_positive(one, zero), zero);
-            if kinematics.j.is_some() {
-                let j = total.j;
-                good = (infinity - j).if_positive(j.if_positive(good, zero), zero);
-            }
-            if let (Some((thermal, w, eta)), Some([out_theta, beta])) = (warmth, &mut out.theta) {
-                thermal.couple(&total, &w, &mut stress);
-                theta.store(out_theta, at);
-                w.beta.store(beta, at);
-                heat.add(at, v_r * w.energy);
-                entropy.add(at, v_r * eta);
-                good = (infinity - theta).if_positive(theta.if_positive(good, zero), zero);
-            }
-            admissible.min(at, good);
-            strain.add(at, v_r * stress.energy);
-            store9(&stress.p, &mut out.q, at);
-            stress.stretch.store(out.wave[0], at);
-            (density / total.j).store(out.wave[1], at);
-            if let Some(sigma_j) = &mut out.sigma_j {
-                stress.sigma_j.store(sigma_j, at);
-            }
-        }
-        if admissible.least() < 1.0 {
-            let (first, _) = reference.layout.slab_range(self.slab);
-            let theta = out.theta.as_ref().map(|[theta, _]| &**theta);
-            return Err(first_breakdown(reference, self.slab, |slot| {
-                let total = kinematics.total::<f64>((), slot);
-                let theta = theta.map_or(1.0, |theta| theta[slot - first]);
-                inadmissible(&total, theta)
-            }));
-        }
-        Ok(Stored {
-            strain: strain.sum(),
-            thermal: heat.sum(),
-            entropy: entropy.sum(),
-        })
-    }
-}
-
-/// Plastic flow over a step, and its heat, for one slab; plastic work and the part of it that
-/// becomes heat [J], and the entropy that it produces [J/K].
-pub(super) struct Flow<'a, M> {
-    pub law: M,
-    pub kinematics: Kinematics<'a>,
-    pub reference: &'a Reference,
-    pub elapsed: f64,
-    pub slab: usize,
-    pub history: [&'a mut [f64]; 7],
-    pub heat: Option<(&'a mut [f64], Thermal)>,
-}
-
-impl<M: Material> Work for Flow<'_, M> {
-    type Output = Plastic;
-    #[inline(always)]
-    fn run<T: Lane>(mut self, token: T::Token) -> Plastic {
-        let volume = self.reference.volume.components()[0];
-        let elapsed = T::splat(token, self.elapsed);
-        let [mut work, mut heat, mut entropy] = [PerSlot::new(0.0); 3];
-        for (at, a) in lanes_of::<T>(self.reference, self.slab) {
-            let total = self.kinematics.total::<T>(token, a);
-            let v_r = T::load(token, volume, a);
-            let mut history: [T; 7] = std::array::from_fn(|c| T::load(token, self.history[c], at));
-            let mut theta = T::splat(token, 0.0);
-            if let Some((eta, thermal)) = &self.heat {
-                let now = T::load(token, eta, at);
-                theta = thermal.warmth(&total, now).theta;
-            }
-            let stress = self
-                .law
-                .stress::<T, true>(&total, theta, &mut history, elapsed);
-            for (c, value) in history.into_iter().enumerate() {
-                value.store(self.history[c], at);
-            }
-            work.add(at, v_r * stress.dissipation);
-            if let Some((eta, thermal)) = &mut self.heat {
-                let gain = thermal.plastic_heat(stress.dissipation);
-                let produced = thermal.entropy_of_heat(theta, gain);
-                let now = T::load(token, eta, at);
-                (now + produced).store(eta, at);
-                heat.add(at, v_r * gain);
-                entropy.add(at, v_r * produced);
-            }
-        }
-        Plastic {
-            work: work.sum(),
-            heat: heat.sum(),
-            entropy: entropy.sum(),
-        }
-    }
-}
-
-/// What plastic flow did in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Plastic {
-    /// Plastic work [J].
-    pub work: f64,
-    /// The part of it that became heat [J].
-    pub heat: f64,
-    /// Entropy that it produced [J/K].
-    pub entropy: f64,
-}
-
-impl std::ops::AddAssign for Plastic {
-    fn add_assign(&mut self, other: Self) {
-        self.work += other.work;
-        self.heat += other.heat;
-        self.entropy += other.entropy;
-    }
 }
 
 /// The rest of one particle that its neighbours need, from the incremental deformation; kinetic
@@ -385,7 +200,7 @@ impl Work for Points<'_, '_> {
 
 /// The first particle of a slab that is in trouble.
 #[cold]
-fn first_breakdown(
+pub(super) fn first_breakdown(
     reference: &Reference,
     slab: usize,
     trouble: impl Fn(usize) -> Option<Trouble>,
@@ -400,17 +215,6 @@ fn first_breakdown(
             slot: first,
             trouble: Trouble::VolumeRatio(f64::NAN),
         })
-}
-
-/// What breaks a particle down at rest: a volume ratio, j's or that of F, or a temperature that is
-/// not positive and finite.
-pub(super) fn inadmissible(total: &Deformation<f64>, theta: f64) -> Option<Trouble> {
-    let det = dot(total.f[0], cofactor(&total.f)[0]);
-    let bad = |value: &f64| !(*value > 0.0 && *value < f64::INFINITY);
-    let ratio = [total.j, det].into_iter().find(bad);
-    ratio
-        .map(Trouble::VolumeRatio)
-        .or_else(|| bad(&theta).then_some(Trouble::Temperature(theta)))
 }
 
 /// Whether a velocity, or its energy, is not finite.
@@ -710,149 +514,5 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
             power.add(at, work);
         }
         0.5 * power.sum()
-    }
-}
-
-/// Fields of a state in one slab.
-pub(super) struct StateSlab<'a> {
-    pub x: [&'a mut [f64]; 3],
-    pub v: [&'a mut [f64]; 3],
-    pub f: [&'a mut [f64]; 9],
-    pub h: Option<[&'a mut [f64]; 9]>,
-    pub j: Option<&'a mut [f64]>,
-    pub eta: Option<&'a mut [f64]>,
-}
-
-/// What turns heat rates into rates of entropy.
-#[derive(Clone, Copy)]
-pub(super) struct Heating<'a> {
-    pub thermal: Thermal,
-    /// Heat into each particle [W].
-    pub heat: &'a [f64],
-    /// Temperature [K].
-    pub theta: &'a [f64],
-}
-
-/// One stage of the integrator for one slab: y = keep y0 + take (y + dt dy/dt).
-pub(super) struct Advance<'a> {
-    pub reference: &'a Reference,
-    pub start: &'a State,
-    pub force: [&'a [f64]; 3],
-    pub grad_v: [&'a [f64]; 9],
-    pub j_rate: Option<&'a [f64]>,
-    pub heating: Option<Heating<'a>>,
-    pub density: f64,
-    pub keep: f64,
-    pub take: f64,
-    pub dt: f64,
-    pub slab: usize,
-    pub out: StateSlab<'a>,
-}
-
-impl Work for Advance<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(mut self, token: T::Token) {
-        let blend = Blend {
-            keep: T::splat(token, self.keep),
-            take: T::splat(token, self.take),
-            dt: T::splat(token, self.dt),
-        };
-        let volume = self.reference.volume.components()[0];
-        let start = self.start;
-        let (x0, v0, f0) = (
-            start.x.components(),
-            start.v.components(),
-            start.f.components(),
-        );
-        let h0 = start.h.as_ref().map(Array::components);
-        let j0 = start.j.as_ref().map(|j| j.components()[0]);
-        let eta0 = start.eta.as_ref().map(|e| e.components()[0]);
-        let density = T::splat(token, self.density);
-        for (at, a) in lanes_of::<T>(self.reference, self.slab) {
-            let out = &mut self.out;
-            let x = load_slab3::<T>(token, &out.x, at);
-            let v = load_slab3::<T>(token, &out.v, at);
-            let f = load_slab9::<T>(token, &out.f, at);
-            let grad = load9::<T>(token, &self.grad_v, a);
-            // Dummies have no volume and no force.
-            let v_r = T::load(token, volume, a);
-            let mass = density.mul_add(v_r, T::splat(token, f64::MIN_POSITIVE));
-            let acceleration = scale3(T::splat(token, 1.0) / mass, load3(token, &self.force, a));
-            store3(&blend.vector(load3(token, &x0, a), x, v), &mut out.x, at);
-            store3(
-                &blend.vector(load3(token, &v0, a), v, acceleration),
-                &mut out.v,
-                at,
-            );
-            store9(
-                &blend.tensor(&load9(token, &f0, a), &f, &grad),
-                &mut out.f,
-                at,
-            );
-            if let (Some(eta), Some(eta0), Some(heating)) = (&mut out.eta, eta0, self.heating) {
-                // V_R d eta/dt = Q/theta ([URL23] 67).
-                let theta = heating.thermal.divisor(T::load(token, heating.theta, a));
-                let capacity = v_r.mul_add(theta, T::splat(token, f64::MIN_POSITIVE));
-                let rate = T::load(token, heating.heat, a) / capacity;
-                let now = T::load(token, eta, at);
-                blend
-                    .scalar(T::load(token, eta0, a), now, rate)
-                    .store(eta, at);
-            }
-            if let (Some(j), Some(j0)) = (&mut out.j, j0) {
-                // dj/dt = h : grad v (56), with h = cof f where it is not independent.
-                let h = match &out.h {
-                    Some(h) => load_slab9::<T>(token, h, at),
-                    None => cofactor(&f),
-                };
-                let mut rate = double_dot(&h, &grad);
-                if let Some(extra) = self.j_rate {
-                    rate = rate + T::load(token, extra, a);
-                }
-                let now = T::load(token, j, at);
-                blend.scalar(T::load(token, j0, a), now, rate).store(j, at);
-            }
-            if let (Some(h), Some(h0)) = (&mut out.h, &h0) {
-                // dh/dt = f x grad v (55).
-                let now = load_slab9::<T>(token, h, at);
-                store9(
-                    &blend.tensor(&load9(token, h0, a), &now, &tensor_cross(&f, &grad)),
-                    h,
-                    at,
-                );
-            }
-        }
-    }
-}
-
-/// keep y0 + take (y + dt k) on lanes.
-#[derive(Clone, Copy)]
-struct Blend<T> {
-    keep: T,
-    take: T,
-    dt: T,
-}
-
-impl<T: Lane> Blend<T> {
-    #[inline(always)]
-    fn scalar(&self, y0: T, y: T, k: T) -> T {
-        self.take.mul_add(self.dt.mul_add(k, y), self.keep * y0)
-    }
-    #[inline(always)]
-    fn vector(&self, y0: Vec3<T>, y: Vec3<T>, k: Vec3<T>) -> Vec3<T> {
-        [
-            self.scalar(y0[0], y[0], k[0]),
-            self.scalar(y0[1], y[1], k[1]),
-            self.scalar(y0[2], y[2], k[2]),
-        ]
-    }
-    #[inline(always)]
-    fn tensor(&self, y0: &Mat3<T>, y: &Mat3<T>, k: &Mat3<T>) -> Mat3<T> {
-        [
-            self.vector(y0[0], y[0], k[0]),
-            self.vector(y0[1], y[1], k[1]),
-            self.vector(y0[2], y[2], k[2]),
-        ]
     }
 }

@@ -9,10 +9,12 @@
 //! Q = V_chi sigma_chi L = V_R P F_chi^T L, and its spatial area c_ab = S_a g_ab - S_b g_ba,
 //! S = V_chi h L.
 
+use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
+use super::laws::{LawInputs, Stored, inadmissible, stresses};
 use super::passes::{
-    Advance, Flow, ForceInput, Forces, Gradient, HalfSlope, Heating, Kinematics, LawInputs, Laws,
-    Limit, PointOutput, Points, StateSlab, Stored, VolumeRates, immovable, inadmissible,
+    ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, PointOutput, Points, VolumeRates,
+    immovable,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
@@ -23,7 +25,7 @@ use crate::parallel;
 use crate::reference::{Reference, load3, store9, with_pairs};
 use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
 
-pub use super::passes::Plastic;
+pub use super::laws::Plastic;
 
 /// The evolving fields: with the time, what the integrator advances and a snapshot copies.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,21 +120,21 @@ pub enum Trouble {
 
 /// What the scene asks of the formulation, resolved to what the loops branch on.
 #[derive(Debug, Clone, Copy)]
-struct Options {
+pub(super) struct Options {
     mode: u8,
     coefficient: f64,
     venkatakrishnan: bool,
     volume_dissipation: f64,
     linear: bool,
-    thermal: Option<Thermal>,
+    pub(super) thermal: Option<Thermal>,
 }
 
 /// The formulation of one body.
 #[derive(Debug)]
 pub struct Url {
     law: Law,
-    options: Options,
-    scratch: Scratch,
+    pub(super) options: Options,
+    pub(super) scratch: Scratch,
     conduction: Option<Conduction>,
     /// Rates of the last evaluation.
     pub rates: Rates,
@@ -275,84 +277,6 @@ impl Url {
             .at(&d, &state.history_at(slot), self.thermal_at(state, slot))
     }
 
-    /// Thermal constants and the entropy of the particle in a slot.
-    fn thermal_at(&self, state: &State, slot: usize) -> Option<(Thermal, f64)> {
-        let eta = state.eta.as_ref()?.get(slot)[0];
-        Some((self.options.thermal?, eta))
-    }
-
-    /// Temperature of the particle in a slot [K]; NaN of a body without heat.
-    pub fn temperature(&self, state: &State, reference: &Reference, slot: usize) -> f64 {
-        let d = self.deformation(state, reference, slot);
-        self.thermal_at(state, slot)
-            .map_or(f64::NAN, |(thermal, eta)| thermal.warmth(&d, eta).theta)
-    }
-
-    /// Temperature that the last evaluation found in a slot [K].
-    pub fn evaluated_temperature(&self, slot: usize) -> f64 {
-        let theta = self.scratch.theta.as_ref();
-        theta.map_or(f64::NAN, |theta| theta.get(slot)[0])
-    }
-
-    /// Heat that the particle in a slot takes up [W] at the evaluated rates while its temperature
-    /// changes at a rate [K/s]: theta d eta/dt.
-    pub fn heat_uptake(&self, state: &State, reference: &Reference, slot: usize, rate: f64) -> f64 {
-        let Some(thermal) = self.options.thermal else {
-            return 0.0;
-        };
-        let d = self.deformation(state, reference, slot);
-        let f = matrix(&state.f.get(slot));
-        let cof = cofactor(&f);
-        // Rate of ln J.
-        let dilation = double_dot(&matrix(&self.rates.grad_v.get(slot)), &cof) / dot(f[0], cof[0]);
-        let theta = self.evaluated_temperature(slot);
-        reference.volume.get(slot)[0] * thermal.uptake(&d, theta, rate, dilation)
-    }
-
-    /// Heat rate that a ledger counts [W]: what comes from outside. The linear law's entropy takes
-    /// heat up at the reference temperature, so that its energy changes by theta/theta_R of the heat
-    /// everywhere, conduction included.
-    pub fn heat_power(&self, external: f64) -> f64 {
-        match (&self.rates.heat, self.options.thermal) {
-            (Some(heat), Some(thermal)) if thermal.linear => {
-                let slots = (0..heat.particles()).map(Layout::slot);
-                slots
-                    .map(|s| heat.get(s)[0] * self.evaluated_temperature(s) / thermal.theta_r)
-                    .sum()
-            }
-            _ => external,
-        }
-    }
-
-    /// Sets the temperature [K] of the particle in a slot at its present deformation; the entropy
-    /// [J/K] and the heat [J] that this takes.
-    pub fn set_temperature(
-        &self,
-        state: &mut State,
-        reference: &Reference,
-        slot: usize,
-        theta: f64,
-    ) -> (f64, f64) {
-        let d = self.deformation(state, reference, slot);
-        let (Some(eta), Some(thermal)) = (&mut state.eta, self.options.thermal) else {
-            return (0.0, 0.0);
-        };
-        let before = eta.get(slot)[0];
-        let after = thermal.entropy(&d, theta);
-        eta.set(slot, [after]);
-        let energy = |eta| thermal.warmth(&d, eta).energy;
-        let volume = reference.volume.get(slot)[0];
-        (
-            volume * (after - before),
-            volume * (energy(after) - energy(before)),
-        )
-    }
-
-    /// Constants of a body with heat.
-    pub fn thermal(&self) -> Option<Thermal> {
-        self.options.thermal
-    }
-
     /// Rates of a state. Of a law with a history, the state of a stage is `elapsed` [s] after the
     /// step's start, whose history it carries; a state at a step's end has its own.
     ///
@@ -490,36 +414,6 @@ impl Url {
         })
     }
 
-    /// Plastic flow from the step's start over `elapsed` [s] at the present state: the history is
-    /// mapped, and the part of the plastic work that becomes heat raises the entropy.
-    pub fn commit(&self, state: &mut State, reference: &Reference, elapsed: f64) -> Plastic {
-        let Some(mut history) = state.history.take() else {
-            return Plastic::default();
-        };
-        let mut eta = state.eta.take();
-        let kinematics = Kinematics::new(state, reference);
-        let mut etas = eta.as_mut().map(|e| e.slabs_mut().into_iter());
-        let (law, thermal) = (self.law, self.options.thermal);
-        let slabs: Vec<_> = history
-            .slabs_mut()
-            .into_iter()
-            .map(|history| {
-                let eta = etas.as_mut().and_then(Iterator::next).map(|[e]| e);
-                (history, eta.zip(thermal))
-            })
-            .collect();
-        let flows = parallel::map_slabs(slabs, |slab, (history, heat)| {
-            with_law!(law, law => flow(Flow {
-                law, kinematics, reference, elapsed, slab, history, heat,
-            }))
-        });
-        state.history = Some(history);
-        state.eta = eta;
-        let mut total = Plastic::default();
-        flows.into_iter().for_each(|f| total += f);
-        total
-    }
-
     /// Force pass; power of the dissipation and squared length by slab.
     fn forces<R: Runner>(&mut self, state: &State, reference: &Reference) -> Vec<(f64, f64)> {
         let (speeds, density) = (self.wave_speeds(), self.law.density());
@@ -634,15 +528,6 @@ impl Url {
         });
     }
 
-    /// What turns heat rates into rates of entropy.
-    fn heating(&self) -> Option<Heating<'_>> {
-        Some(Heating {
-            thermal: self.options.thermal?,
-            heat: self.rates.heat.as_ref()?.components()[0],
-            theta: self.scratch.theta.as_ref()?.components()[0],
-        })
-    }
-
     /// Makes the current configuration the reference ([URL22] algorithm 1, steps 5 to 8): F_chi <-
     /// f F_chi, H_chi <- h H_chi, J_chi <- j J_chi, chi <- x, f = h = I, j = 1.
     ///
@@ -728,47 +613,6 @@ impl Url {
             + s.theta.as_ref().map_or(0, Array::bytes)
             + self.rates.heat.as_ref().map_or(0, Array::bytes)
             + self.conduction.as_ref().map_or(0, Conduction::bytes)
-    }
-}
-
-/// Plastic flow in one slab; compiled only for the laws that have a history.
-fn flow<M: Material>(work: Flow<M>) -> Plastic {
-    if M::HISTORY {
-        vectorised(work)
-    } else {
-        Plastic::default()
-    }
-}
-
-/// The law pass of one slab, compiled for what the body has; with `flow` a history is mapped.
-fn stresses<'a, R: Runner, M: Material>(
-    law: M,
-    inputs: LawInputs<'a>,
-    flow: bool,
-    slab: usize,
-    out: &mut PointOutput<'a>,
-) -> std::result::Result<Stored, Breakdown> {
-    macro_rules! laws {
-        ($heat:literal, $flow:literal) => {
-            R::run(Laws::<M, $heat, $flow> {
-                law,
-                inputs,
-                slab,
-                out,
-            })
-        };
-    }
-    if M::HISTORY {
-        match (inputs.heat.is_some(), flow) {
-            (false, false) => laws!(false, false),
-            (true, false) => laws!(true, false),
-            (false, true) => laws!(false, true),
-            (true, true) => laws!(true, true),
-        }
-    } else if inputs.heat.is_some() {
-        laws!(true, false)
-    } else {
-        laws!(false, false)
     }
 }
 
