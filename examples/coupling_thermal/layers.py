@@ -23,7 +23,7 @@ def film_heat_capacity(scene):
 class Pulse:
     """The laser: q = peak exp(-((t - middle) / width)^2), as in the scene [W/m^2]."""
 
-    peak, middle, width = 5.642e10, 6e-8, 2e-8
+    peak, middle, width = 3.7613e10, 8e-8, 3e-8
 
     def energy(self, t):
         """Supplied until t [J/m^2]."""

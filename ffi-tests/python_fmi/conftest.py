@@ -61,6 +61,29 @@ SCENES = {
         },
         initial={},
     ),
+    "hot": column(
+        material={
+            "von_mises": {
+                "density": 1100.0, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
+                "yield_stress": 1e5, "hardening_modulus": 1e6,
+            }
+        },
+        heat={"specific_heat": 500.0, "reference_temperature": 300.0, "conductivity": 40.0,
+              "gruneisen_coefficient": 0.5},
+        boundary={
+            "y_min": {"support": "clamped", "temperature": {"external": 300.0}},
+            "top": {
+                "traction": {"external": [1000.0, 0.0, 0.0]},
+                "heat_flux": {"external": 0.0, "per_particle": True},
+            },
+            "x_max": {
+                "convection": {
+                    "coefficient": {"external": 0.0},
+                    "ambient_temperature": {"external": 300.0},
+                }
+            },
+        },
+    ),
     "mooney": column(
         material={
             "mooney_rivlin": {

@@ -155,6 +155,63 @@ def test_moving_support(start):
     assert instance.get("boundary.top.force")[1] > 0
 
 
+def test_heat(start, version):
+    instance = start("hot")
+    if version == 3:
+        assert instance.shape("boundary.top.heat_flux") == (25,)
+    instance.set("boundary.top.heat_flux", 1e6)
+    instance.set("boundary.x_max.convection_coefficient", 1e3)
+    instance.set("boundary.x_max.ambient_temperature", 400.0)
+    instance.set("boundary.y_min.prescribed_temperature", 310.0)
+    # Heat flows answer at once: flux x area, coefficient x area x difference.
+    assert instance.get("boundary.top.heat_flow") == pytest.approx(1e6, rel=1e-12)
+    assert instance.get("boundary.x_max.heat_flow") == pytest.approx(3e5, rel=1e-9)
+    for name, wrong in [("boundary.y_min.prescribed_temperature", 0.0),
+                        ("boundary.x_max.ambient_temperature", -1.0),
+                        ("boundary.x_max.convection_coefficient", -1.0)]:
+        assert status(instance.set, name, wrong) == ERROR
+    state = instance.get_state()
+    instance.run(0.01, 0.005)
+    after = instance.observe()
+    assert instance.get("boundary.y_min.mean_temperature") == pytest.approx(310.0, rel=1e-12)
+    assert instance.get("boundary.top.mean_temperature") > 300.0
+    top = instance.get("boundary.top.maximum_temperature")
+    assert instance.get("boundary.top.mean_temperature") <= top
+    assert instance.get("probe.tip.temperature") == pytest.approx(top, rel=1e-2)
+    energies = {n: instance.get(f"energy.{n}") for n in ["thermal", "heat_in", "closure_error"]}
+    assert energies["thermal"] > 0 and energies["heat_in"] > 0
+    residual = abs(energies["closure_error"]) / energies["heat_in"]
+    print(f"closure error {residual:.1e} of the heat, tolerance 1e-3")
+    assert residual < 1e-3
+    assert instance.get("entropy.production") > 0 and "energy.plastic_work" in instance
+    # Back, and the same again.
+    instance.set_state(state)
+    instance.time = 0.0
+    instance.run(0.01, 0.005)
+    assert instance.observe() == after
+    if version == 3:
+        each = instance.get("boundary.top.particle_temperature")
+        assert each.max() == top
+        assert instance.get("field.temperature").max() >= top
+        assert instance.get("field.equivalent_plastic_strain").min() >= 0
+
+
+def test_heat_parameters(start):
+    cold, warm = start("hot", initialize=False), start("hot")
+    cold.initialize(heat__specific_heat=1000.0, material__yield_stress=2e5)
+    assert cold.get("heat.specific_heat") == 1000.0
+    for driver in (cold, warm):
+        driver.set("boundary.top.heat_flux", 1e6)
+        driver.step(0.01)
+    assert cold.get("boundary.top.mean_temperature") < warm.get("boundary.top.mean_temperature")
+
+
+def test_a_body_without_heat_has_none_of_it(start):
+    names = " ".join(start().variables)
+    for word in ["temperature", "heat", "entropy", "thermal", "plastic", "contact", "ballistic"]:
+        assert word not in names
+
+
 def test_parameters(start):
     base, stiff = start(), start(initialize=False)
     stiff.initialize(material__youngs_modulus=6.8e7, numerics__cfl=0.3)

@@ -31,6 +31,7 @@ pub fn ffi_tests(sh: &Shell) -> Result<Tally> {
         ("programs", setup.programs(sh)),
         ("example in C", setup.c_example(sh)),
         ("example in C++", setup.cpp_example(sh)),
+        ("structural coupling", setup.structural_coupling(sh)),
         ("python", setup.python(sh)),
     ] {
         let part = outcome.unwrap_or_else(|error| Tally::of(Err::<(), _>(error)));
@@ -237,6 +238,33 @@ impl Setup {
         for program in ["swinging_column", "swinging_column_static"] {
             tally += self.example(sh, &build.join(program), &[], "time steps");
         }
+        Ok(tally)
+    }
+
+    /// examples/coupling_structure: the program checks what must hold.
+    fn structural_coupling(&self, sh: &Shell) -> Result<Tally> {
+        let build = self.cmake(
+            sh,
+            "examples/coupling_structure",
+            "coupling_structure",
+            &["-DCMAKE_BUILD_TYPE=Release"],
+        )?;
+        let residuals = build.join("residuals.csv");
+        let residuals = residuals.to_str().context("the path is not UTF-8")?;
+        let mut tally = self.example(
+            sh,
+            &build.join("coupling_structure"),
+            &[residuals],
+            "the structural coupling holds",
+        );
+        let (python, picture) = (&self.python, build.join("residuals.png"));
+        let drawn = cmd!(
+            sh,
+            "{python} -B examples/coupling_structure/plot.py {residuals} {picture}"
+        )
+        .quiet()
+        .run();
+        tally += Tally::of(drawn);
         Ok(tally)
     }
 

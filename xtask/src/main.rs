@@ -24,6 +24,7 @@ Tasks:
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
+  fmu-tests   The tests of the FMUs from Python alone, and the thermal coupling of two FMUs
   header      Generate include/urlsph.h; with --check only see whether it is up to date
   install     --prefix DIR [--destdir DIR]: command line, library, headers, pkg-config and CMake
               files
@@ -49,6 +50,7 @@ fn run(arguments: &[String]) -> Result<()> {
     match arguments.as_slice() {
         ["demo"] => demo::demo(&sh),
         ["ffi-tests"] => ffi_tests::run(&sh),
+        ["fmu-tests"] => fmu_tests::run(&sh),
         ["header"] => header::header(&sh, false),
         ["header", "--check"] => header::header(&sh, true),
         ["install", arguments @ ..] => install::install(&sh, arguments),
