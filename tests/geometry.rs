@@ -109,7 +109,14 @@ fn every_body_runs() {
     ] {
         for neighbours in ["6", "18", "26", r#"{"radius": 1.6}"#] {
             let set = format!("numerics.neighbours={neighbours}");
-            let mut s = simulation(&geometry, &[&set, r#"initial={"velocity": ["Y", 0, 0]}"#])
+            let mut overrides = vec![set.as_str(), r#"initial={"velocity": ["Y", 0, 0]}"#];
+            if geometry.contains("wedge") && neighbours == "6" {
+                // The edges of the prisms around the axis leave the repair too little to choose from.
+                let error = simulation(&geometry, &overrides).unwrap_err().to_string();
+                assert!(error.contains("numerics.neighbours"), "{error}");
+                overrides.push("numerics.operators=kernel");
+            }
+            let mut s = simulation(&geometry, &overrides)
                 .unwrap_or_else(|e| panic!("{geometry}, {neighbours}: {e}"));
             let before = s.momenta().linear;
             s.advance(3.0 * s.stable_step())
