@@ -234,8 +234,8 @@ fn smooth_flow_is_left_alone() {
 #[test]
 fn a_plastic_wave_follows_its_precursor() {
     let exact = Table::read(&example("cable", "expected_johnson_cook.csv"));
-    let (yield_stress, hardening) = (1.5e-3, 0.05);
-    let plastic_speed = ((0.5 + hardening) / (1.5 + hardening) as f64).sqrt();
+    let (yield_stress, hardening) = (1.5e-3, 0.05_f64);
+    let plastic_speed = ((0.5 + hardening) / (1.5 + hardening)).sqrt();
     let at_the_wall = yield_stress + plastic_speed * (2.0 * LOAD - yield_stress);
     let plastic = (at_the_wall - yield_stress) / (0.5 + hardening);
     let stress = exact.column("stress");

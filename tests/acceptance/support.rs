@@ -120,7 +120,7 @@ impl Table {
 
     /// The table in a file.
     pub fn read(path: &Path) -> Self {
-        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
+        let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
         let mut lines = text.lines();
         let names = lines
             .next()
