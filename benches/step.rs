@@ -24,6 +24,8 @@ const HEAT: &str = r#"heat={
     "specific_heat": 383, "reference_temperature": 293, "conductivity": 10, "gruneisen_coefficient": 0.1
 }"#;
 
+const JITTER: &str = "geometry.box.jitter={\"fraction\": 0.2}";
+
 /// The twisted column after a few steps, at a spacing.
 fn column(spacing: f64, threads: usize, overrides: &[&str]) -> Simulation {
     let mut all = vec![format!("geometry.box.spacing={spacing}")];
@@ -95,6 +97,23 @@ fn options(c: &mut Criterion) {
                 "numerics.reference_update=every_step",
                 "numerics.kernel_option=4",
             ],
+        ),
+        (
+            "20 % jitter, operators of the kernel",
+            &[JITTER, "numerics.operators=kernel"],
+        ),
+        ("20 % jitter, repaired", &[JITTER]),
+        (
+            "20 % jitter, repaired, update every step, option 3",
+            &[
+                JITTER,
+                "numerics.reference_update=every_step",
+                "numerics.kernel_option=3",
+            ],
+        ),
+        (
+            "20 % jitter, operators of the mesh, 26 neighbours",
+            &[JITTER, "numerics.operators=mesh", "numerics.neighbours=26"],
         ),
         ("26 neighbours", &["numerics.neighbours=26"]),
         ("6 neighbours", &["numerics.neighbours=6"]),

@@ -87,6 +87,8 @@ pub(super) fn lanes_of<T: Lane>(
 /// Gradient of a vector field with respect to the reference (54).
 pub(super) struct Gradient<'a, 'o, P> {
     pub pairs: P,
+    /// L_a of these pairs.
+    pub l: [&'a [f64]; 9],
     pub reference: &'a Reference,
     pub field: [&'a [f64]; 3],
     pub slab: usize,
@@ -97,7 +99,6 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
-        let l = self.reference.l.components();
         for (at, a) in lanes_of::<T>(self.reference, self.slab) {
             let centre = self.pairs.centre::<T>(token, a);
             let own = load3::<T>(token, &self.field, a);
@@ -106,7 +107,7 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
                 let (g, _) = self.pairs.pair(token, &centre, b, pair);
                 sum = add_outer(&sum, sub3(load3(token, &self.field, b), own), g);
             }
-            store9(&mat_mul_t(&sum, &load9(token, &l, a)), self.out, at);
+            store9(&mat_mul_t(&sum, &load9(token, &self.l, a)), self.out, at);
         }
     }
 }
@@ -149,6 +150,7 @@ impl Work for Points<'_, '_> {
         } = self;
         let (l, volume) = (reference.l.components(), reference.volume.components()[0]);
         let density = T::splat(token, self.density);
+        let fallback = reference.fallback();
         let half = T::splat(token, 0.5);
         let mut kinetic = PerSlot::new(0.0);
         let mut admissible = PerSlot::new(1.0);
@@ -162,7 +164,16 @@ impl Work for Points<'_, '_> {
             let cof_f = cofactor(&f);
             if let Some(half_grad) = &mut out.half_grad {
                 let factor = half / dot(f[0], cof_f[0]);
-                let grad = load_slab9::<T>(token, &out.grad_v, at);
+                let mut grad = load_slab9::<T>(token, &out.grad_v, at);
+                if let Some(fallback) = &fallback {
+                    let mask = T::load(token, fallback.doubtful, a);
+                    let other = load_slab9::<T>(token, half_grad, at);
+                    for (row, other) in grad.iter_mut().zip(other) {
+                        for (g, o) in row.iter_mut().zip(other) {
+                            *g = mask.if_positive(o, *g);
+                        }
+                    }
+                }
                 store9(&scale9(factor, &mat_mul_t(&grad, &cof_f)), half_grad, at);
             }
 
@@ -417,10 +428,10 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             store3(&force, &mut out, at);
             power.add(at, work);
             if P::BOUND_BY_AREAS {
-                // 5 lambda / kappa, kappa = sum |c_ab| / (J V_R): a particle with little volume and
-                // large areas, which irregular ones have, binds the step by more than its distances.
+                // 3.5 lambda / kappa, kappa = sum |c_ab| / (J V_R): little volume next to large areas
+                // binds the step of D^p by more than the distances. Tetrahedra are stable up to 4.
                 let mass = T::splat(token, density) * T::load(token, volume, a);
-                let bound = T::splat(token, 5.0) * here.stretch * mass / (here.density * areas);
+                let bound = T::splat(token, 3.5) * here.stretch * mass / (here.density * areas);
                 length2 = areas.if_positive(length2.min(bound * bound), length2);
             }
             shortest.min(at, length2);

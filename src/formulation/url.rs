@@ -22,7 +22,7 @@ use crate::layout::{Array, Layout};
 use crate::material::{Deformation, History, Law, Material, Point, Thermal, VIRGIN, with_law};
 use crate::math::*;
 use crate::parallel;
-use crate::reference::{Reference, load3, store9, with_pairs};
+use crate::reference::{Fallback, Reference, load3, store9, with_pairs};
 use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
 
 pub use super::laws::Plastic;
@@ -399,6 +399,17 @@ impl Url {
         let law = *law;
         parallel::map_slabs(slabs, |slab, mut out| {
             gradient::<R>(reference, v, slab, &mut out.grad_v);
+            if let (Some(fallback), Some(out)) = (reference.fallback(), &mut out.half_grad) {
+                let Fallback { pairs, l, .. } = fallback;
+                R::run(Gradient {
+                    pairs,
+                    l,
+                    reference,
+                    field: v,
+                    slab,
+                    out,
+                });
+            }
             let stored = with_law!(law, law => {
                 stresses::<R, _>(law, inputs, elapsed.is_some(), slab, &mut out)
             })?;
@@ -623,8 +634,9 @@ fn gradient<'a, R: Runner>(
     slab: usize,
     out: &mut [&'a mut [f64]; 9],
 ) {
+    let l = reference.l.components();
     with_pairs!(reference, pairs => R::run(Gradient {
-        pairs, reference, field, slab, out,
+        pairs, l, reference, field, slab, out,
     }));
 }
 

@@ -91,6 +91,19 @@ impl CellKind {
             ],
         }
     }
+    /// Corners at the other ends of the three edges of a corner.
+    fn edges_at(self, corner: usize) -> [usize; 3] {
+        let mut ends = [usize::MAX; 3];
+        for face in self.faces() {
+            if let Some(i) = face.iter().position(|c| *c == corner) {
+                // Each edge is in two faces: it comes after the corner in one of them.
+                let end = face[(i + 1) % face.len()];
+                let free = ends.iter().position(|e| *e == usize::MAX);
+                ends[free.expect("three faces meet in a corner")] = end;
+            }
+        }
+        ends
+    }
     /// Name, in the plural.
     pub fn plural(self) -> &'static str {
         match self {
@@ -526,6 +539,26 @@ impl Mesh {
             }
         }
         c
+    }
+
+    /// Share of the full solid angle that the cells of each particle fill: 1 inside, 1/2 on a flat
+    /// part of the surface.
+    pub fn solid_angles(&self, positions: &[[f64; 3]]) -> Vec<f64> {
+        let mut angles = vec![0.0; positions.len()];
+        for cell in &self.cells {
+            for (corner, &node) in cell.nodes().iter().enumerate() {
+                let x = positions[node as usize];
+                let [a, b, c] = cell.kind.edges_at(corner).map(|other| {
+                    let r = sub3(positions[cell.nodes[other] as usize], x);
+                    scale3(1.0 / dot(r, r).sqrt(), r)
+                });
+                // Van Oosterom and Strackee (1983).
+                let volume = dot(a, cross(b, c)).abs();
+                let angle = volume.atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a));
+                angles[node as usize] += angle / (2.0 * std::f64::consts::PI);
+            }
+        }
+        angles
     }
 
     /// Particles that share an edge, a face or a cell with a particle, ascending.

@@ -6,18 +6,18 @@ use urlsph::Simulation;
 use crate::support::*;
 
 /// A scalar measured over time, with the column of the reference that it is compared with.
-struct Signal {
-    name: &'static str,
+pub struct Signal {
+    pub name: &'static str,
     measure: fn(&Simulation) -> f64,
 }
 
 /// What is compared, and how well it must agree.
-struct Case {
-    name: &'static str,
+pub struct Case {
+    pub name: &'static str,
     /// One residual per group: the largest norm of the differences of its signals.
-    groups: &'static [&'static [Signal]],
+    pub groups: &'static [&'static [Signal]],
     /// End of the comparison with tolerances [s].
-    end: f64,
+    pub end: f64,
     /// Tolerances of M3 and M4, relative to the reference's maximum.
     tolerances: [f64; 2],
 }
@@ -28,7 +28,7 @@ impl Case {
     }
 }
 
-const BENDING: Case = Case {
+pub const BENDING: Case = Case {
     name: "column_bending",
     groups: &[
         &[
@@ -74,7 +74,7 @@ const TENSION: Case = Case {
     tolerances: [0.02, 0.007],
 };
 
-const TWISTING: Case = Case {
+pub const TWISTING: Case = Case {
     name: "column_twisting",
     groups: &[&[Signal {
         name: "angle_deg",
@@ -96,6 +96,16 @@ struct History(Vec<Vec<f64>>);
 
 impl History {
     fn record(case: &Case, model: Model, end: f64, overrides: &[&str]) -> Self {
+        Self::record_with(case, model, end, overrides, |_| ())
+    }
+
+    fn record_with(
+        case: &Case,
+        model: Model,
+        end: f64,
+        overrides: &[&str],
+        mut after: impl FnMut(&Simulation),
+    ) -> Self {
         let mut simulation = column(case.name, model, overrides);
         let mut rows: Vec<Vec<f64>> = Vec::new();
         run(&mut simulation, end, |s| {
@@ -110,6 +120,7 @@ impl History {
                 row.push(value);
             }
             rows.push(row);
+            after(s);
         });
         Self(rows)
     }
@@ -167,6 +178,17 @@ fn parabola(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> (f64, f64) {
         time,
         a.1 + left * (time - a.0) + curvature * (time - a.0) * (time - b.0),
     )
+}
+
+/// Per group, the error of a model over the largest value of the reference, and the energy that the
+/// scheme dissipated over the initial one.
+pub fn errors(case: &Case, model: Model, overrides: &[&str]) -> (Vec<f64>, f64) {
+    let mut dissipated = 0.0;
+    let history = History::record_with(case, model, case.end, overrides, |s| {
+        dissipated = dissipation_ratio(s);
+    });
+    let residuals = history.residuals(case, &Table::expected(case.name));
+    (residuals, dissipated)
 }
 
 /// M1 to M4 approach the reference; M3 and M4 within their tolerances.

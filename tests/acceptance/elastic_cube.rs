@@ -9,10 +9,10 @@ use crate::support::*;
 const DENSITY: f64 = 1100.0;
 const MU: f64 = 6_538_500.0;
 const LAMBDA: f64 = 9_807_700.0;
-const AMPLITUDE: f64 = 5e-7;
+pub const AMPLITUDE: f64 = 5e-7;
 
 /// Angular frequency: each component solves the wave equation with the pressure wave speed.
-fn omega() -> f64 {
+pub fn omega() -> f64 {
     0.75_f64.sqrt() * PI * ((LAMBDA + 2.0 * MU) / DENSITY).sqrt()
 }
 
@@ -41,14 +41,14 @@ pub fn gradient(x: &[f64]) -> [[f64; 3]; 3] {
 }
 
 /// Errors of velocity and Cauchy stress.
-struct Errors {
-    velocity: f64,
-    stress: f64,
+pub struct Errors {
+    pub velocity: f64,
+    pub stress: f64,
 }
 
 /// L2 errors at a time. They are relative to the largest norm over a period, not to the present
 /// one: at t = 8e-3 s, half a period, the exact velocity is nearly zero.
-fn errors(nodes: usize, time: f64, amplitude: f64, overrides: &[&str]) -> Errors {
+pub fn errors(nodes: usize, time: f64, amplitude: f64, overrides: &[&str]) -> Errors {
     let spacing = format!("geometry.box.spacing={}", 1.0 / (nodes - 1) as f64);
     let mut all = vec![spacing.as_str()];
     all.extend_from_slice(overrides);

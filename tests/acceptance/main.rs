@@ -8,6 +8,7 @@ mod conservation;
 mod elastic_cube;
 mod heat;
 mod homogeneous;
+mod irregular;
 mod metals;
 mod numerics;
 mod punch;

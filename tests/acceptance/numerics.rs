@@ -25,24 +25,6 @@ fn difference(a: &Simulation, b: &Simulation) -> f64 {
     largest / scale
 }
 
-/// Energy at time 0, from the ledger.
-fn initial_energy(simulation: &Simulation) -> f64 {
-    let e = simulation.energies();
-    let total = e.kinetic + e.strain + e.numerical_dissipation + e.projection;
-    total - e.external_work - e.closure_error
-}
-
-/// Kinetic and strain energy over the initial energy.
-fn energy_ratio(simulation: &Simulation) -> f64 {
-    let e = simulation.energies();
-    (e.kinetic + e.strain) / initial_energy(simulation)
-}
-
-/// Energy dissipated by the scheme over the initial energy.
-fn dissipation_ratio(simulation: &Simulation) -> f64 {
-    simulation.energies().numerical_dissipation / initial_energy(simulation)
-}
-
 /// Options 1 and 2 only change the notation: what remains is round-off over hundreds of steps.
 #[test]
 fn options_1_and_2_do_not_depend_on_the_schedule() {

@@ -96,6 +96,24 @@ pub fn check_at_least(what: &str, value: f64, bound: f64) {
     assert!(value >= bound, "{what}: {value} < {bound}");
 }
 
+/// Energy at time 0, from the ledger.
+pub fn initial_energy(simulation: &Simulation) -> f64 {
+    let e = simulation.energies();
+    let total = e.kinetic + e.strain + e.numerical_dissipation + e.projection;
+    total - e.external_work - e.closure_error
+}
+
+/// Kinetic and strain energy over the initial energy.
+pub fn energy_ratio(simulation: &Simulation) -> f64 {
+    let e = simulation.energies();
+    (e.kinetic + e.strain) / initial_energy(simulation)
+}
+
+/// Energy dissipated by the scheme over the initial energy.
+pub fn dissipation_ratio(simulation: &Simulation) -> f64 {
+    simulation.energies().numerical_dissipation / initial_energy(simulation)
+}
+
 /// Observed order between two resolutions.
 pub fn order(coarse: (f64, f64), fine: (f64, f64)) -> f64 {
     (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
