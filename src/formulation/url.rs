@@ -13,8 +13,8 @@ use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
 use super::laws::{LawInputs, Stored, inadmissible, stresses};
 use super::passes::{
-    ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, PointOutput, Points, VolumeRates,
-    immovable,
+    Bound, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, PointOutput, Points,
+    VolumeRates, immovable,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
@@ -22,7 +22,7 @@ use crate::layout::{Array, Layout};
 use crate::material::{Deformation, History, Law, Material, Point, Thermal, VIRGIN, with_law};
 use crate::math::*;
 use crate::parallel;
-use crate::reference::{Fallback, Reference, load3, store9, with_pairs};
+use crate::reference::{Pairs, Reference, load3, store9, with_pairs};
 use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
 
 pub use super::laws::Plastic;
@@ -323,6 +323,7 @@ impl Url {
                 });
             });
         }
+        self.bound::<R>(state, reference);
         for (dissipation, length2) in self.forces::<R>(state, reference) {
             total.dissipation += dissipation;
             total.length = total.length.min(length2);
@@ -399,17 +400,6 @@ impl Url {
         let law = *law;
         parallel::map_slabs(slabs, |slab, mut out| {
             gradient::<R>(reference, v, slab, &mut out.grad_v);
-            if let (Some(fallback), Some(out)) = (reference.fallback(), &mut out.half_grad) {
-                let Fallback { pairs, l, .. } = fallback;
-                R::run(Gradient {
-                    pairs,
-                    l,
-                    reference,
-                    field: v,
-                    slab,
-                    out,
-                });
-            }
             let stored = with_law!(law, law => {
                 stresses::<R, _>(law, inputs, elapsed.is_some(), slab, &mut out)
             })?;
@@ -423,6 +413,28 @@ impl Url {
             })?;
             Ok((stored, kinetic))
         })
+    }
+
+    /// Sees to it that operators which are no least-squares fit dissipate.
+    fn bound<R: Runner>(&mut self, state: &State, reference: &Reference) {
+        let Pairs::Closed(pairs) = reference.pair_vectors() else {
+            return;
+        };
+        let Some(mut half_grad) = self.scratch.half_grad.take() else {
+            return;
+        };
+        let speeds = self.wave_speeds();
+        let input = ForceInput::new(state, reference, &self.scratch);
+        parallel::map_slabs(half_grad.slabs_mut(), |slab, half_grad| {
+            R::run(Bound {
+                pairs,
+                input,
+                speeds,
+                slab,
+                half_grad,
+            });
+        });
+        self.scratch.half_grad = Some(half_grad);
     }
 
     /// Force pass; power of the dissipation and squared length by slab.
@@ -634,9 +646,8 @@ fn gradient<'a, R: Runner>(
     slab: usize,
     out: &mut [&'a mut [f64]; 9],
 ) {
-    let l = reference.l.components();
     with_pairs!(reference, pairs => R::run(Gradient {
-        pairs, l, reference, field, slab, out,
+        pairs, reference, field, slab, out,
     }));
 }
 
