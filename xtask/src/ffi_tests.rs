@@ -10,8 +10,12 @@ use xshell::{Shell, cmd};
 use crate::tally::Tally;
 use crate::{header, install, project, venv, wheel};
 
-/// A column, and a metal with heat.
-const SCENES: [&str; 2] = ["ffi-tests/scene.json", "ffi-tests/metal.json"];
+/// A column, a metal with heat, and a block between planes of contact.
+const SCENES: [&str; 3] = [
+    "ffi-tests/scene.json",
+    "ffi-tests/metal.json",
+    "ffi-tests/contact.json",
+];
 
 /// `cargo xtask ffi-tests`: these alone.
 pub fn run(sh: &Shell) -> Result<()> {
