@@ -474,6 +474,24 @@ def test_ctrl_c_ends_a_step(column):
     column.step(1e-5)
 
 
+README = (ROOT / "include" / "python" / "README.md").read_text()
+READMES = README + (ROOT / "README.md").read_text()
+
+
+@pytest.mark.parametrize("program", re.findall(r"```python\n(.*?)```", READMES, re.DOTALL))
+def test_what_the_readme_shows(program, tmp_path, monkeypatch):
+    scenes = [("column", SCENE), ("scene", SCENE), ("part", METAL), ("block", CONTACT)]
+    for name, scene in scenes:
+        (tmp_path / f"{name}.json").write_text(scene.read_text())
+    monkeypatch.chdir(tmp_path)
+    exec(compile(program, "README.md", "exec"), {})
+
+
+def test_the_readme_names_all_energies():
+    for name in urlsph.Energies._fields:
+        assert f"`{name}`" in README, name
+
+
 def test_loading_errors_name_the_remedy(tmp_path):
     package = Path(urlsph.__file__).parent
     copy = tmp_path / "urlsph"
