@@ -569,6 +569,14 @@ impl Geometry {
         }
     }
 
+    /// Takes over what the same geometry has read from its files.
+    #[cfg(feature = "fmi")]
+    pub(super) fn adopt(&mut self, read: &Self) {
+        if let (Geometry::Mesh(_), Geometry::Mesh(_)) = (&*self, read) {
+            self.clone_from(read);
+        }
+    }
+
     /// Reads what the geometry keeps in files, relative to a folder.
     pub(super) fn load(&mut self, folder: &Path) -> Result<()> {
         match self {
