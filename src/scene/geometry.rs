@@ -19,7 +19,8 @@ use crate::error::{Code, Error, Result};
 use crate::particles::MeshFile;
 use crate::plan::bytes_per_particle;
 
-/// What a particle takes beside that while a body is set up [bytes], on a lattice and elsewhere; measured.
+/// What a particle takes beside [`bytes_per_particle`] while a body is set up [bytes], on a lattice and
+/// elsewhere; measured.
 const SETUP_BYTES_PER_PARTICLE: (f64, f64) = (100.0, 420.0);
 /// What a pair takes while the lists are built [bytes].
 const SETUP_BYTES_PER_PAIR: f64 = 4.0;
@@ -884,8 +885,8 @@ pub(super) fn selection(path: &str, patch: &PatchSelection, faces: &[String]) ->
     Ok(())
 }
 
-/// Particles and the places in the lists of neighbours that each has inside the body, with the place in the scene that
-/// says so, by part of the body. In f64, as a tiny spacing overflows any integer.
+/// By part of the body: the number of particles, the length of the list of neighbours of one inside, and
+/// the path in the scene that says so. In f64, as a tiny spacing overflows any integer.
 fn sizes(geometry: &Geometry, neighbours: Neighbours) -> Result<Vec<(f64, f64, String)>> {
     let pairs = |count: f64, h: [f64; 3]| match neighbours {
         Neighbours::Lattice(number) => f64::from(number),
