@@ -313,10 +313,11 @@ impl Simulation {
         linear.min(1.0 / decay)
     }
 
-    /// The CFL number alpha of the scene, or the default for its neighbours.
+    /// The CFL number alpha of the scene, or the default for its neighbours and its Poisson ratio.
     pub fn cfl_number(&self) -> f64 {
         let (_, most) = self.reference.neighbour_range;
-        self.scene.numerics.cfl_number(most)
+        let (_, [_, _, poisson_ratio]) = self.scene.material.elastic();
+        self.scene.numerics.cfl_number(most, poisson_ratio)
     }
 
     /// Advances to exactly `t_next`, in as many stable steps as needed.
