@@ -138,9 +138,17 @@ pub(super) struct Points<'a, 'o> {
     pub out: &'o mut PointOutput<'a>,
 }
 
+/// What the point pass sums over a slab.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    /// Kinetic energy [J].
+    pub kinetic: f64,
+    /// Smallest square of a length that bounds the step [m^2].
+    pub length2: f64,
+}
+
 impl Work for Points<'_, '_> {
-    /// Kinetic energy, and the smallest square of a length that bounds the step [m^2].
-    type Output = std::result::Result<(f64, f64), Breakdown>;
+    type Output = std::result::Result<Motion, Breakdown>;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> Self::Output {
         let Self {
@@ -217,7 +225,10 @@ impl Work for Points<'_, '_> {
                 immovable(load3((), &v, slot), self.density * volume[slot])
             }));
         }
-        Ok((kinetic.sum(), shortest.least()))
+        Ok(Motion {
+            kinetic: kinetic.sum(),
+            length2: shortest.least(),
+        })
     }
 }
 

@@ -13,8 +13,8 @@ use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
 use super::laws::{LawInputs, Stored, inadmissible, stresses};
 use super::passes::{
-    ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, PointOutput, Points, VolumeRates,
-    immovable, spacings,
+    ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, Motion, PointOutput, Points,
+    VolumeRates, immovable, spacings,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
@@ -322,12 +322,12 @@ impl Url {
             ..Evaluation::default()
         };
         for point in self.points::<R>(state, reference, elapsed) {
-            let (stored, (kinetic, length2)) = point?;
-            total.length = total.length.min(length2);
+            let (stored, motion) = point?;
+            total.length = total.length.min(motion.length2);
             total.strain += stored.strain;
             total.thermal += stored.thermal;
             total.entropy += stored.entropy;
-            total.kinetic += kinetic;
+            total.kinetic += motion.kinetic;
         }
         if self.options.venkatakrishnan
             && let Some(half_grad) = &mut self.scratch.half_grad
@@ -375,14 +375,13 @@ impl Url {
         Ok(total)
     }
 
-    /// Gradient, law and point passes; what is stored, the kinetic energy, and the smallest squared
-    /// length that bounds the step, by slab.
+    /// Gradient, law and point passes; what is stored and how it moves, by slab.
     fn points<R: Runner>(
         &mut self,
         state: &State,
         reference: &Reference,
         elapsed: Option<f64>,
-    ) -> Vec<std::result::Result<(Stored, (f64, f64)), Breakdown>> {
+    ) -> Vec<std::result::Result<(Stored, Motion), Breakdown>> {
         let Self {
             law,
             options,
@@ -446,7 +445,7 @@ impl Url {
             let stored = with_law!(law, law => {
                 stresses::<R, _>(law, inputs, elapsed.is_some(), slab, &mut out)
             })?;
-            let kinetic = R::run(Points {
+            let motion = R::run(Points {
                 density,
                 kinematics,
                 reference,
@@ -455,7 +454,7 @@ impl Url {
                 slab,
                 out: &mut out,
             })?;
-            Ok((stored, kinetic))
+            Ok((stored, motion))
         })
     }
 
