@@ -615,7 +615,7 @@ fn extreme(what: &str, scene: Scene, ledger: f64) -> Result<Simulation, urlsph::
 
 /// Next to melting a bar flows like a fluid: its foot is thinner in F than in the distances of its
 /// particles, which alone let the step be too large (from 26 us on), and the linear reconstruction on
-/// its own gains energy (from 16 us on).
+/// its own gains energy (from 19 us on).
 #[test]
 fn bar_next_to_melting_gains_no_energy() {
     let near_melt = scene(
