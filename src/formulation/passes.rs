@@ -234,7 +234,7 @@ impl Work for Points<'_, '_> {
 
 /// Margin of the length that follows from a particle's own deformation over the shortest distance to
 /// its neighbours, at rest: bars that are stable by their distances alone do not meet it, and one that
-/// is not has become unstable at 2.3.
+/// is not has become unstable at about 2.3.
 const SPACING_MARGIN: f64 = 1.6;
 
 /// Square of the length over which the gradient of a particle varies, as deformed by F, times the
