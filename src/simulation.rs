@@ -695,6 +695,14 @@ impl Simulation {
         self.boundary.wall_names()
     }
 
+    /// A point of a plane of contact at time 0 [m], and its unit normal.
+    ///
+    /// # Panics
+    /// If `wall` is not an index into [`contact_names`](Self::contact_names).
+    pub fn contact_plane(&self, wall: usize) -> ([f64; 3], [f64; 3]) {
+        self.boundary.wall_plane(wall)
+    }
+
     /// What a plane of contact does now, and has done since time 0.
     ///
     /// # Panics

@@ -944,3 +944,58 @@ fn the_schema_accepts_what_the_parser_accepts() {
         assert!(Scene::from_json(&scene.to_string(), &[]).is_err());
     }
 }
+
+/// What the README shows is valid: its scene, its geometries, and its conditions on that scene.
+#[test]
+fn the_scenes_of_the_readme_are_valid() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let readme = std::fs::read_to_string(format!("{root}/README.md")).unwrap();
+    // As the text says: comments are not part of JSON.
+    let blocks: Vec<String> = readme
+        .split("```jsonc\n")
+        .skip(1)
+        .map(|rest| {
+            let block = rest.split("```").next().unwrap();
+            let lines = block.lines().map(|l| l.split("//").next().unwrap());
+            lines.collect::<Vec<_>>().join("\n")
+        })
+        .collect();
+    let [scene, geometries, conditions] = &blocks[..] else {
+        panic!("{} blocks", blocks.len());
+    };
+    let scene: Value = serde_json::from_str(scene).unwrap();
+    let valid = |scene: &Value| {
+        Scene::from_json(&scene.to_string(), &[]).unwrap_or_else(|e| panic!("{e}: {scene}"))
+    };
+    valid(&scene);
+
+    let mut with = scene.clone();
+    let conditions: Value = serde_json::from_str(&format!("{{{conditions}}}")).unwrap();
+    for (key, value) in conditions.as_object().unwrap() {
+        with[key] = value.clone();
+    }
+    valid(&with);
+
+    let place = |min: i32| {
+        format!(
+            r#"{{"min": [{min}, 0, 0], "max": [{}, 1, 1], "spacing": 0.5}}"#,
+            min + 1
+        )
+    };
+    let geometries = geometries
+        .replacen("{...}", &place(0), 1)
+        .replacen("{...}", &place(1), 1)
+        .replace("bar.msh", &format!("{root}/examples/meshes/bar_1.msh"));
+    let mut bare = json!({ "boundary": {}, "time": { "end": 1 } });
+    bare["material"] = scene["material"].clone();
+    let mut kinds = Vec::new();
+    for geometry in serde_json::Deserializer::from_str(&geometries).into_iter::<Value>() {
+        bare["geometry"] = geometry.unwrap();
+        valid(&bare);
+        kinds.extend(bare["geometry"].as_object().unwrap().keys().cloned());
+    }
+    assert_eq!(
+        kinds,
+        ["box", "boxes", "cylinder", "perforated_box", "mesh"]
+    );
+}

@@ -13,7 +13,7 @@ use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
 use super::laws::{LawInputs, Stored, inadmissible, stresses};
 use super::passes::{
-    ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, Motion, PointOutput, Points,
+    Bound, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, Motion, PointOutput, Points,
     VolumeRates, immovable, spacings,
 };
 use super::riemann::{self, WaveSpeeds};
@@ -22,7 +22,7 @@ use crate::layout::{Array, Layout};
 use crate::material::{Deformation, History, Law, Material, Point, Thermal, VIRGIN, with_law};
 use crate::math::*;
 use crate::parallel;
-use crate::reference::{Fallback, Reference, load3, store9, with_pairs};
+use crate::reference::{Pairs, Reference, load3, store9, with_pairs};
 use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
 
 pub use super::laws::Plastic;
@@ -343,6 +343,7 @@ impl Url {
                 });
             });
         }
+        self.bound::<R>(state, reference);
         let mode = self.options.mode;
         for (dissipation, length2) in self.forces::<R>(state, reference, mode) {
             total.dissipation += dissipation;
@@ -431,17 +432,6 @@ impl Url {
         let law = *law;
         parallel::map_slabs(slabs, |slab, mut out| {
             gradient::<R>(reference, v, slab, &mut out.grad_v);
-            if let (Some(fallback), Some(out)) = (reference.fallback(), &mut out.half_grad) {
-                let Fallback { pairs, l, .. } = fallback;
-                R::run(Gradient {
-                    pairs,
-                    l,
-                    reference,
-                    field: v,
-                    slab,
-                    out,
-                });
-            }
             let stored = with_law!(law, law => {
                 stresses::<R, _>(law, inputs, elapsed.is_some(), slab, &mut out)
             })?;
@@ -456,6 +446,28 @@ impl Url {
             })?;
             Ok((stored, motion))
         })
+    }
+
+    /// Sees to it that operators which are no least-squares fit dissipate.
+    fn bound<R: Runner>(&mut self, state: &State, reference: &Reference) {
+        let Pairs::Closed(pairs) = reference.pair_vectors() else {
+            return;
+        };
+        let Some(mut half_grad) = self.scratch.half_grad.take() else {
+            return;
+        };
+        let speeds = self.wave_speeds();
+        let input = ForceInput::new(state, reference, &self.scratch);
+        parallel::map_slabs(half_grad.slabs_mut(), |slab, half_grad| {
+            R::run(Bound {
+                pairs,
+                input,
+                speeds,
+                slab,
+                half_grad,
+            });
+        });
+        self.scratch.half_grad = Some(half_grad);
     }
 
     /// Force pass; power of the dissipation and squared length by slab.
@@ -728,9 +740,8 @@ fn gradient<'a, R: Runner>(
     slab: usize,
     out: &mut [&'a mut [f64]; 9],
 ) {
-    let l = reference.l.components();
     with_pairs!(reference, pairs => R::run(Gradient {
-        pairs, l, reference, field, slab, out,
+        pairs, reference, field, slab, out,
     }));
 }
 

@@ -94,10 +94,6 @@ pub struct Reference {
 #[derive(Debug)]
 struct ClosedOperators {
     multipliers: Multipliers,
-    /// L of the kernel's own gradient, for [`Reference::fallback`].
-    l: Array<9>,
-    /// 1 where that gradient is the one for the reconstruction, else 0.
-    doubtful: Array<1>,
     /// k^ of the updated reference; without it, k of the initial one.
     weights: Option<Vec<Slots>>,
     /// A_R N [m^2], initial.
@@ -106,17 +102,6 @@ struct ClosedOperators {
     scale: f64,
     /// The first repair.
     report: Repair,
-}
-
-/// See [`Reference::fallback`].
-#[derive(Clone, Copy)]
-pub struct Fallback<'a> {
-    /// 1 where it is needed, else 0.
-    pub doubtful: &'a [f64],
-    /// Its pair vectors.
-    pub pairs: Lean<'a>,
-    /// Its L.
-    pub l: [&'a [f64]; 9],
 }
 
 #[inline(always)]
@@ -169,7 +154,7 @@ impl Reference {
     /// plane, or where the operators cannot be repaired.
     pub fn new(particles: &Particles, graph: &Graph, numerics: &Numerics) -> Result<Self> {
         let layout = Layout::new(particles.count());
-        let operators = operators(particles, numerics);
+        let operators = numerics.operators_on(matches!(particles.shape, Shape::Lattice(_)));
         let volumes = match operators {
             Operators::Repaired => evened_out(particles, graph),
             _ => particles.volumes.clone(),
@@ -375,11 +360,8 @@ impl Reference {
                 Some(slot),
             ));
         }
-        let doubtful = repair::doubtful(problem, &multipliers);
         self.closed = Some(ClosedOperators {
             multipliers,
-            doubtful,
-            l: Array::new(self.layout, [0.0; 9]),
             weights: None,
             surface: area,
             scale,
@@ -398,37 +380,13 @@ impl Reference {
         !matches!(self.pair_vectors(), Pairs::Lean(_))
     }
 
-    /// The gradient for the reconstruction in particles where that of the deformation will not do.
-    ///
-    /// A particle with few neighbours or little volume may owe all of a repaired gradient, or more,
-    /// to one of them: what is reconstructed from it makes energy. In a gradient by the kernel alone,
-    /// which is a least-squares fit, the share of a neighbour lies between 0 and 1.
-    pub fn fallback(&self) -> Option<Fallback<'_>> {
-        let closed = self.closed.as_ref()?;
-        Some(Fallback {
-            doubtful: closed.doubtful.components()[0],
-            pairs: self.kernel_vectors(closed),
-            l: closed.l.components(),
-        })
-    }
-
-    fn kernel_vectors<'a>(&'a self, closed: &'a ClosedOperators) -> Lean<'a> {
-        match (&closed.weights, &self.updated) {
-            (Some(k), Some(u)) => Lean {
-                k: bytemuck::must_cast_slice(k),
-                x: u.chi.components(),
-            },
-            _ => Lean {
-                k: self.slices.weights(),
-                x: self.x_initial.components(),
-            },
-        }
-    }
-
     /// The pair vectors now.
     pub fn pair_vectors(&self) -> Pairs<'_> {
         if let Some(closed) = &self.closed {
-            let Lean { k, x } = self.kernel_vectors(closed);
+            let (k, x) = match (&closed.weights, &self.updated) {
+                (Some(k), Some(u)) => (bytemuck::must_cast_slice(k), u.chi.components()),
+                _ => (self.slices.weights(), self.x_initial.components()),
+            };
             return Pairs::Closed(Closed {
                 k,
                 x,
@@ -528,9 +486,7 @@ impl Reference {
             repair::multipliers(problem, guess.expect("solved for by an update"))
         };
         let multipliers = multipliers.map_err(|Flat(slot)| slot)?;
-        let doubtful = repair::doubtful(problem, &multipliers);
         if let (Some(updated), Some(closed)) = (&mut self.updated, &mut self.closed) {
-            closed.doubtful = doubtful;
             updated.half_mu = Some(multipliers.half_mu.clone());
             closed.multipliers = multipliers;
             closed.weights = Some(weights);
@@ -555,13 +511,6 @@ impl Reference {
             |slab, out| with_pairs!(this, pairs => vectorised(Correct { pairs, this, points, f_chi, slab, out })),
         );
         self.l = l;
-        if let Some(closed) = &mut self.closed {
-            // sum v (x) L k B r, since k B r is complete too.
-            for slot in (0..self.layout.particles).map(Layout::slot) {
-                let (l, b) = (self.l.get(slot), closed.multipliers.base.get(slot));
-                closed.l.set(slot, flat(&mat_mul(&rows(l), &rows(b))));
-            }
-        }
         bad.into_iter().flatten().next()
     }
 
@@ -632,9 +581,6 @@ impl Reference {
         let closed = self.closed.as_ref().map_or(0, |c| {
             c.multipliers.half_mu.bytes()
                 + c.multipliers.lambda.bytes()
-                + c.multipliers.base.bytes()
-                + c.l.bytes()
-                + c.doubtful.bytes()
                 + c.surface.bytes()
                 + c.weights
                     .as_ref()
@@ -648,15 +594,6 @@ impl Reference {
             + closed
             + self.stored.as_ref().map_or(0, StoredVectors::bytes)
     }
-}
-
-/// The operators of a body: the scene's choice, or the kernel's where particles form a lattice, on
-/// which they close, and where weights are as printed; repaired ones elsewhere.
-fn operators(particles: &Particles, numerics: &Numerics) -> Operators {
-    numerics.operators.unwrap_or(match particles.shape {
-        Shape::Mesh(_) if numerics.weights == Weights::Unit => Operators::Repaired,
-        _ => Operators::Kernel,
-    })
 }
 
 /// Evens out the volumes over the solid angles that they fill, by exchange between neighbours: small

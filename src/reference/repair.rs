@@ -64,8 +64,6 @@ pub struct Multipliers {
     pub half_mu: Array<3>,
     /// Lambda [the unit of C over that of w r].
     pub lambda: Array<9>,
-    /// B, for the kernel's own pseudo-areas [the same].
-    pub base: Array<9>,
 }
 
 /// What a repair took and what it left.
@@ -388,19 +386,14 @@ impl<'a> System<'a> {
                 }
             }
         });
-        let base = std::mem::replace(&mut self.base, Array::empty());
-        Multipliers {
-            half_mu,
-            lambda,
-            base,
-        }
+        Multipliers { half_mu, lambda }
     }
 
     /// Root mean square of the changes over that of the pseudo-areas; from C = 0, of the changes to
     /// the kernel's.
     fn size(&self, multipliers: &Multipliers) -> f64 {
         let problem = self.problem;
-        let base = multipliers.base.components();
+        let base = self.base.components();
         let parts = parallel::map_slabs((0..problem.layout.slabs()).collect(), |slab, _: usize| {
             vectorised(Size {
                 problem,
@@ -667,69 +660,6 @@ impl Work for Direct<'_> {
                 beta.mul_add(T::load(token, self.direction[c], at), preconditioned)
                     .store(self.direction[c], at);
             }
-        }
-    }
-}
-
-/// 1 in the particles where a neighbour's share in the repaired gradient, C_ab . r_ab / (2 V_a), is
-/// negative or nearly all, else 0.
-pub fn doubtful(problem: Problem, multipliers: &Multipliers) -> Array<1> {
-    let mut doubtful = Array::new(problem.layout, [0.0]);
-    let (half_mu, lambda) = (
-        multipliers.half_mu.components(),
-        multipliers.lambda.components(),
-    );
-    parallel::map_slabs(doubtful.slabs_mut(), |slab, [out]| {
-        vectorised(Shares {
-            problem,
-            half_mu,
-            lambda,
-            slab,
-            out,
-        });
-    });
-    doubtful
-}
-
-/// See [`doubtful`]; of a slab.
-struct Shares<'a> {
-    problem: Problem<'a>,
-    half_mu: [&'a [f64]; 3],
-    lambda: [&'a [f64]; 9],
-    slab: usize,
-    out: &'a mut [f64],
-}
-
-impl Work for Shares<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Lane>(self, token: T::Token) {
-        /// Tetrahedral cylinders blow up with 1 (and -0.2 from below), and are stable with 0.9.
-        const MOST: f64 = 0.8;
-        let Problem {
-            layout,
-            slices,
-            weights,
-            x,
-            volume,
-            ..
-        } = self.problem;
-        let [most, zero, one] = [MOST, 0.0, 1.0].map(|v| T::splat(token, v));
-        for (at, a) in lanes_of::<T>(layout, self.slab) {
-            let xa = load3::<T>(token, &x, a);
-            let mu = load3::<T>(token, &self.half_mu, a);
-            let lambda = load9::<T>(token, &self.lambda, a);
-            let twice = T::splat(token, 2.0) * T::load(token, volume, a);
-            let mut out = zero;
-            for (b, pair) in slices.of(a) {
-                let r = sub3(load3(token, &x, b), xa);
-                let w = T::load(token, weights, pair);
-                let difference = sub3(mu, load3(token, &self.half_mu, b));
-                let share = w * dot(add3(mat_vec(&lambda, r), difference), r);
-                out = (share - most * twice).if_positive(one, out);
-                out = (-share).if_positive(one, out);
-            }
-            out.store(self.out, at);
         }
     }
 }

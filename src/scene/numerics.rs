@@ -88,6 +88,15 @@ impl Numerics {
         self.kernel_option >= 3 && self.reference_update != ReferenceUpdate::Never
     }
 
+    /// The operators: the scene's choice, or the kernel's where particles form a lattice, on which they
+    /// close, and where weights are as printed; repaired ones elsewhere.
+    pub(crate) fn operators_on(&self, lattice: bool) -> Operators {
+        self.operators.unwrap_or(match self.weights {
+            Weights::Unit if !lattice => Operators::Repaired,
+            _ => Operators::Kernel,
+        })
+    }
+
     /// The CFL number: the scene's, or the one that is proven stable for the largest number of
     /// neighbours of a particle and the Poisson ratio.
     ///
