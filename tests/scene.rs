@@ -391,7 +391,8 @@ fn everything() -> Value {
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
-            "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
+            "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3,
+            "smallest_step": 0.01
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
@@ -670,6 +671,8 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.cfl=0", S, "numerics.cfl", &["more than 0"]),
         ("numerics.cfl=2.5", S, "numerics.cfl", &["at most 2"]),
         ("numerics.time_step=0", S, "numerics.time_step", &["above 0"]),
+        ("numerics.smallest_step=-0.1", S, "numerics.smallest_step", &["0 or more"]),
+        ("numerics.smallest_step=1", S, "numerics.smallest_step", &["less than 1"]),
         ("numerics={\"time_step\": 1e-5, \"cfl\": 0.5}", S, "numerics.time_step", &["not both"]),
         // Time, probes, output.
         ("time.end=0", S, "time.end", &["above 0"]),
