@@ -11,6 +11,7 @@ Needs matplotlib and meshio (`ffi-tests/requirements.txt`).
 import argparse
 import csv
 import json
+import math
 import xml.etree.ElementTree
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def states(folder):
 def draw_states(axes, run, field, mirrored):
     """The plane of angle 0, mirrored: one field on the right, another on the left."""
     offset, frames = 0.0, list(states(run))
-    frames = frames[:: max(1, (len(frames) - 1) // 5)]
+    frames = frames[:: max(1, math.ceil((len(frames) - 1) / 5))]
     ranges, clouds = {}, {}
     for name in (field, mirrored):
         values = np.concatenate([m.point_data[name].ravel() for _, m in frames]) * NAMES[name][1]
