@@ -549,13 +549,18 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
     }
 }
 
+/// Most that a reconstructed step may take of what the jumps of a particle dissipate. In smooth flow both
+/// are alike and the differences cancel among neighbours: 1 makes a tetrahedral cylinder in torsion lose
+/// a third more, 1.1 nothing. Noise dies out up to 1.5.
+const MOST: f64 = 1.2;
+
 /// Scales the gradients for the reconstruction so that they do not make energy.
 ///
 /// Half of what a pair dissipates belongs to each of its particles: sum_b dv . K (dv - g_a dx) / 2, K being
 /// D_ab per jump. Were g_a the least-squares fit with the weights K, that would be sum_b |dv - g_a dx|_K^2 / 2.
 /// A repaired gradient, which may owe all of itself to one neighbour, or more, can make it negative, and
 /// modes have grown by it (tetrahedra, nu = 0.495). g_a is scaled where the second term is more than
-/// 1.2 times the first.
+/// [`MOST`] times the first.
 pub(super) struct Bound<'a, P> {
     pub pairs: P,
     pub input: ForceInput<'a>,
@@ -572,9 +577,6 @@ impl<P: PairVectors> Work for Bound<'_, P> {
             pressure: T::splat(token, self.speeds.pressure),
             shear: T::splat(token, self.speeds.shear),
         };
-        /// In smooth flow both terms are alike and the differences cancel among neighbours: 1 makes a
-        /// tetrahedral cylinder in torsion lose a third more, 1.1 nothing. Noise dies out up to 1.5.
-        const MOST: f64 = 1.2;
         let [zero, one, most] = [0.0, 1.0, MOST].map(|v| T::splat(token, v));
         for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
             let here = self.input.here::<T>(token, a);
@@ -628,6 +630,48 @@ impl<P: PairVectors> Work for HalfSlope<'_, P> {
             let half = T::splat(token, 0.5) / dot(f[0], cof[0]);
             let slope = mat_vec(&cof, mat_vec(&load9(token, &l, a), sum));
             store3(&scale3(half, slope), &mut self.out, at);
+        }
+    }
+}
+
+/// Scales the slopes for the reconstruction of D^j, as [`Bound`] the gradients for that of D^p.
+pub(super) struct BoundSlope<'a, P> {
+    pub pairs: P,
+    pub input: ForceInput<'a>,
+    pub sigma: &'a [f64],
+    pub pressure_speed: f64,
+    pub slab: usize,
+    pub half_slope: [&'a mut [f64]; 3],
+}
+
+impl<P: PairVectors> Work for BoundSlope<'_, P> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(mut self, token: T::Token) {
+        let [zero, one, most] = [0.0, 1.0, MOST].map(|v| T::splat(token, v));
+        let speed = T::splat(token, self.pressure_speed);
+        for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
+            let here = self.input.here::<T>(token, a);
+            let centre = self.pairs.centre::<T>(token, a);
+            let sa = load9::<T>(token, &self.input.s, a);
+            let sigma_a = T::load(token, self.sigma, a);
+            let half: Vec3<T> = std::array::from_fn(|c| T::load(token, &self.half_slope[c], at));
+            let (mut jumps, mut half_steps) = (zero, zero);
+            for (b, pair) in self.input.reference.slices.of(a) {
+                let (g, back) = self.pairs.pair(token, &centre, b, pair);
+                let mut p = self.input.pair(&here, b);
+                p.area = sub3(
+                    mat_vec(&sa, g),
+                    mat_vec(&load9(token, &self.input.s, b), back),
+                );
+                let difference = T::load(token, self.sigma, b) - sigma_a;
+                let d = riemann::volume_dissipation(&p, difference, speed, one);
+                jumps = d.mul_add(difference, jumps);
+                half_steps = d.mul_add(dot(half, p.dx), half_steps);
+            }
+            let (steps, limit) = (half_steps + half_steps, most * jumps);
+            let share = (steps - limit).if_positive(limit / steps, one);
+            store3(&scale3(share, half), &mut self.half_slope, at);
         }
     }
 }

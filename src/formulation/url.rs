@@ -13,8 +13,8 @@ use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
 use super::laws::{LawInputs, Stored, inadmissible, stresses};
 use super::passes::{
-    Bound, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, Motion, PointOutput, Points,
-    VolumeRates, immovable, spacings,
+    Bound, BoundSlope, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, Motion,
+    PointOutput, Points, VolumeRates, immovable, spacings,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
@@ -531,6 +531,20 @@ impl Url {
             });
         }
         let input = ForceInput::new(state, reference, scratch);
+        if options.linear
+            && let Pairs::Closed(pairs) = reference.pair_vectors()
+        {
+            parallel::map_slabs(half_slope.slabs_mut(), |slab, half_slope| {
+                R::run(BoundSlope {
+                    pairs,
+                    input,
+                    sigma,
+                    pressure_speed,
+                    slab,
+                    half_slope,
+                });
+            });
+        }
         let (slope, j_chi) = (half_slope.components(), kinematics.j_chi);
         let coefficient = options.volume_dissipation;
         let powers = parallel::map_slabs(out.slabs_mut(), |slab, [out]| {
