@@ -16,6 +16,7 @@
 //! the tributary volume out of k, which makes a uniform stress force-free inside the body; then the
 //! kernel of a pair is the mean of both particles', so that k_ab = k_ba.
 
+mod coarse;
 mod pairs;
 mod repair;
 mod slices;
@@ -334,6 +335,7 @@ impl Reference {
             tolerance: AT_START.0,
             scale,
             iterations: AT_START.1,
+            coarse: true,
         };
         let problem = Problem {
             layout: self.layout,
@@ -480,6 +482,7 @@ impl Reference {
                 tolerance: AT_UPDATES.0,
                 scale: closed.scale,
                 iterations: AT_UPDATES.1,
+                coarse: false,
             };
             repair::solve(problem, guess, goal).map(|s| s.0)
         } else {
