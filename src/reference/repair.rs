@@ -123,6 +123,7 @@ pub fn solve(
         let levels = Levels::new(&problem);
         system.coarse = levels.map(|levels| (levels, Array::new(layout, [0.0; 3])));
     }
+    let guessed = guess.is_some();
     let mut mu = guess.unwrap_or_else(|| Array::new(layout, [0.0; 3]));
     let mut residual = system.residual(&mu);
     let mut direction = Array::new(layout, [0.0; 3]);
@@ -162,6 +163,12 @@ pub fn solve(
             }
         });
         report.iterations += 1;
+    }
+    if report.after > report.before && !guessed {
+        // Without a repair, where more than affine fields cost nothing, the iterations run away.
+        mu.fill(0.0);
+        residual.copy_from(&system.rhs);
+        report.after = report.before;
     }
     report.worst = system.worst(&residual);
     let multipliers = system.multipliers(mu);
