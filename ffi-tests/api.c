@@ -12,8 +12,9 @@
 
 #include "check.h"
 
-/* The files of the scenes, the arguments of the program: a column, and a metal with heat. */
-static const char *scene_path, *metal_path;
+/* The files of the scenes, the arguments of the program: a column, a metal with heat, and a block
+ * between planes of contact. */
+static const char *scene_path, *metal_path, *contact_path;
 
 static const double nan_ = NAN;
 static const double inf_ = INFINITY;
@@ -201,6 +202,8 @@ static bool all_give(urlsph_simulation *s, urlsph_status wanted) {
     urlsph_patch_info patch_info;
     urlsph_resultant resultant;
     urlsph_heat_resultant heat_resultant;
+    urlsph_contact_info contact_info;
+    urlsph_contact_resultant contact_resultant;
     urlsph_field_info field_info;
     urlsph_view view;
     urlsph_probe_info probe_info;
@@ -247,6 +250,9 @@ static bool all_give(urlsph_simulation *s, urlsph_status wanted) {
         GIVES(urlsph_set_temperature(s, 0, values, 1));
         GIVES(urlsph_set_convection(s, 0, values, 1, values, 1));
         GIVES(urlsph_get_heat_resultant(s, 0, &heat_resultant, sizeof heat_resultant));
+        GIVES(urlsph_find_contact(s, "floor", &n));
+        GIVES(urlsph_get_contact_info(s, 0, &contact_info, sizeof contact_info));
+        GIVES(urlsph_get_contact_resultant(s, 0, &contact_resultant, sizeof contact_resultant));
         GIVES(urlsph_read_input(s, 0, URLSPH_TRACTION, d, 1024, &n));
         GIVES(urlsph_step(s, 1e-5));
         GIVES(urlsph_advance_to(s, 1.0));
@@ -373,7 +379,7 @@ static void struct_sizes(void) {
 #define PROBE_INFO(p, n) urlsph_get_probe_info(s, 0, p, n)
 #define MOTION(p, n) urlsph_get_probe_motion(s, 0, p, n)
 #define INPUT_INFO(p, n) urlsph_get_input_info(s, 0, p, n)
-    SIZES(COUNTS, urlsph_counts);
+    SIZES_SINCE(COUNTS, urlsph_counts, offsetof(urlsph_counts, contacts));
     SIZES_SINCE(ENERGIES, urlsph_energies, offsetof(urlsph_energies, thermal));
     SIZES(MOMENTA, urlsph_momenta);
     SIZES(PATCH_INFO, urlsph_patch_info);
@@ -389,6 +395,15 @@ static void struct_sizes(void) {
 #define HEAT_RESULTANT(p, n) urlsph_get_heat_resultant(s, 0, p, n)
     SIZES(HEAT_RESULTANT, urlsph_heat_resultant);
     INVALID(urlsph_get_heat_resultant(s, 0, NULL, sizeof(urlsph_heat_resultant)));
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+    s = create_from(contact_path, NULL, 1);
+    CHECK(s);
+#define CONTACT_INFO(p, n) urlsph_get_contact_info(s, 0, p, n)
+#define CONTACT_RESULTANT(p, n) urlsph_get_contact_resultant(s, 0, p, n)
+    SIZES(CONTACT_INFO, urlsph_contact_info);
+    SIZES(CONTACT_RESULTANT, urlsph_contact_resultant);
+    INVALID(urlsph_get_contact_info(s, 0, NULL, sizeof(urlsph_contact_info)));
+    INVALID(urlsph_get_contact_resultant(s, 0, NULL, sizeof(urlsph_contact_resultant)));
     CHECK(urlsph_destroy(s) == URLSPH_OK);
 }
 
@@ -847,6 +862,75 @@ static void resultants(void) {
     CHECK(urlsph_destroy(s) == URLSPH_OK);
 }
 
+/* A block falls onto a floor, and a piston comes down on it. */
+static void contact(void) {
+    urlsph_simulation *s = create_from(contact_path, NULL, 2);
+    CHECK(s);
+    urlsph_counts counts;
+    CHECK(urlsph_get_counts(s, &counts, sizeof counts) == URLSPH_OK && counts.contacts == 2);
+    size_t floor_ = SIZE_MAX, piston = SIZE_MAX, none = SIZE_MAX;
+    CHECK(urlsph_find_contact(s, "floor", &floor_) == URLSPH_OK);
+    CHECK(urlsph_find_contact(s, "piston", &piston) == URLSPH_OK && piston != floor_);
+    urlsph_contact_info info;
+    CHECK(urlsph_get_contact_info(s, piston, &info, sizeof info) == URLSPH_OK);
+    CHECK(strcmp(info.name, "piston") == 0 && info.point[1] == 2.001 && info.normal[1] == -1.0);
+    CHECK(urlsph_get_contact_info(s, floor_, &info, sizeof info) == URLSPH_OK);
+    /* The scene's normal is twice as long. */
+    CHECK(strcmp(info.name, "floor") == 0 && info.point[1] == 0.0 && info.normal[1] == 1.0);
+    INVALID(urlsph_find_contact(s, "wall", &none));
+    CHECK(strstr(last(s).text, "floor, piston"));
+    INVALID(urlsph_find_contact(s, NULL, &none));
+    INVALID(urlsph_find_contact(s, "floor", NULL));
+    urlsph_contact_resultant f, p, again;
+    INVALID(urlsph_get_contact_info(s, 2, &info, sizeof info));
+    INVALID(urlsph_get_contact_resultant(s, SIZE_MAX, &f, sizeof f));
+    CHECK(strstr(last(s).text, "plane of contact"));
+
+    /* The floor stops the lowest layer at once, a quarter of a metre of 1100 kg/m^3 at 1 m/s. */
+    CHECK(urlsph_get_contact_resultant(s, floor_, &f, sizeof f) == URLSPH_OK);
+    CHECK(urlsph_get_contact_resultant(s, piston, &p, sizeof p) == URLSPH_OK);
+    CHECK(f.particles == 9 && f.displacement == 0.0 && p.particles == 0 && p.displacement == 0.0);
+    CHECK_NEAR(f.impulse[1], 275.0, 1e-10);
+    CHECK(f.impulse[0] == 0.0 && f.impulse[2] == 0.0 && p.impulse[1] == 0.0 && p.force[1] == 0.0);
+
+    /* Nothing but the two planes changes the momentum of 2200 kg at -1 m/s. */
+    CHECK(urlsph_step(s, 4e-3) == URLSPH_OK);
+    urlsph_momenta m;
+    CHECK(urlsph_get_momenta(s, &m, sizeof m) == URLSPH_OK);
+    CHECK(urlsph_get_contact_resultant(s, floor_, &f, sizeof f) == URLSPH_OK);
+    CHECK(urlsph_get_contact_resultant(s, piston, &p, sizeof p) == URLSPH_OK);
+    const double missing = f.impulse[1] + p.impulse[1] - (m.linear[1] + 2200.0);
+    CHECK_NEAR(missing, 0.0, 1e-8);
+    CHECK(f.particles == 9 && f.force[1] > 0.0 && f.force[0] == 0.0);
+    CHECK(p.particles == 9 && p.impulse[1] < 0.0 && p.force[1] < 0.0);
+    CHECK_NEAR(p.displacement, 8e-3, 1e-15);
+    /* The totals are part of the state. */
+    size_t size, written;
+    CHECK(urlsph_get_snapshot_size(s, &size) == URLSPH_OK);
+    uint8_t *bytes = malloc(size);
+    CHECK(bytes && urlsph_save_snapshot(s, bytes, size, &written) == URLSPH_OK);
+    const double before = p.impulse[1], dt = 1e-6;
+    CHECK(urlsph_step(s, dt) == URLSPH_OK);
+    CHECK(urlsph_get_contact_resultant(s, piston, &again, sizeof again) == URLSPH_OK);
+    /* The force is the rate of the impulse. */
+    const double rate = (again.impulse[1] - before) / dt;
+    CHECK_NEAR(rate / p.force[1], 1.0, 1e-3);
+    CHECK(urlsph_restore_snapshot(s, bytes, size) == URLSPH_OK);
+    CHECK(urlsph_get_contact_resultant(s, piston, &again, sizeof again) == URLSPH_OK);
+    CHECK(memcmp(&p, &again, sizeof p) == 0);
+    free(bytes);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+
+    /* A scene without planes. */
+    s = create(NULL, 1);
+    CHECK(s && urlsph_get_counts(s, &counts, sizeof counts) == URLSPH_OK && counts.contacts == 0);
+    INVALID(urlsph_find_contact(s, "floor", &none));
+    CHECK(strstr(last(s).text, "none"));
+    INVALID(urlsph_get_contact_info(s, 0, &info, sizeof info));
+    INVALID(urlsph_get_contact_resultant(s, 0, &f, sizeof f));
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
 static void snapshots(void) {
     urlsph_simulation *s = create(NULL, 2), *other = create("material.neo_hookean.poisson_ratio=0.21", 1);
     CHECK(s && other);
@@ -1158,12 +1242,13 @@ static void divergence(void) {
 }
 
 int main(int argc, char **argv) {
-    if (argc != 3) {
-        fprintf(stderr, "usage: %s SCENE.json METAL.json\n", argv[0]);
+    if (argc != 4) {
+        fprintf(stderr, "usage: %s SCENE.json METAL.json CONTACT.json\n", argv[0]);
         return 2;
     }
     scene_path = argv[1];
     metal_path = argv[2];
+    contact_path = argv[3];
     RUN(versions);
     RUN(creation_from_text);
     RUN(creation_fails);
@@ -1178,6 +1263,7 @@ int main(int argc, char **argv) {
     RUN(heat_snapshots);
     RUN(time_step);
     RUN(resultants);
+    RUN(contact);
     RUN(snapshots);
     RUN(callbacks);
     RUN(busy);

@@ -17,7 +17,7 @@
 
 namespace {
 
-std::string scene_path, metal_path;
+std::string scene_path, metal_path, contact_path;
 
 urlsph::Simulation create(std::size_t threads = 2) {
     urlsph::Options options;
@@ -155,6 +155,26 @@ void heat() {
     CHECK(thrown([&] { (void)cold.heat_resultant(0); }).code() == URLSPH_INVALID_ARGUMENT);
 }
 
+void contact() {
+    urlsph::Simulation s = urlsph::Simulation::from_file(contact_path);
+    CHECK(s.counts().contacts == 2);
+    const std::size_t floor = s.contact("floor"), piston = s.contact("piston");
+    CHECK(std::string(s.contact_info(floor).name) == "floor");
+    CHECK(s.contact_info(floor).normal[1] == 1.0 && s.contact_info(piston).point[1] == 2.001);
+    CHECK(s.contact_resultant(floor).particles == 9 && s.contact_resultant(piston).particles == 0);
+    CHECK_NEAR(s.contact_resultant(floor).impulse[1], 275.0, 1e-10);
+    s.step(4e-3);
+    const double impulse =
+        s.contact_resultant(floor).impulse[1] + s.contact_resultant(piston).impulse[1];
+    CHECK_NEAR(impulse, s.momenta().linear[1] + 2200.0, 1e-8);
+    CHECK_NEAR(s.contact_resultant(piston).displacement, 8e-3, 1e-15);
+    CHECK(s.contact_resultant(piston).force[1] < 0.0 && s.energies().contact_dissipation > 0.0);
+    const urlsph::Error e = thrown([&] { (void)s.contact("wall"); });
+    CHECK(e.code() == URLSPH_INVALID_ARGUMENT);
+    CHECK(std::string(e.what()).find("floor, piston") != std::string::npos);
+    CHECK(thrown([&] { (void)s.contact_resultant(2); }).code() == URLSPH_INVALID_ARGUMENT);
+}
+
 void snapshots() {
     urlsph::Simulation s = create();
     s.set_traction(s.patch("top"), {1e4, 0.0, 0.0});
@@ -248,16 +268,18 @@ void threads() {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 3) {
-        std::fprintf(stderr, "usage: %s SCENE.json METAL.json\n", argv[0]);
+    if (argc != 4) {
+        std::fprintf(stderr, "usage: %s SCENE.json METAL.json CONTACT.json\n", argv[0]);
         return 2;
     }
     scene_path = argv[1];
     metal_path = argv[2];
+    contact_path = argv[3];
     RUN(creation);
     RUN(ownership);
     RUN(queries);
     RUN(heat);
+    RUN(contact);
     RUN(snapshots);
     RUN(callbacks);
     RUN(threads);

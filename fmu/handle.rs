@@ -128,7 +128,7 @@ pub(super) unsafe fn instantiate(arguments: Arguments, refusal: Option<&str>) ->
             Error::argument("the token is NULL: pass the one of modelDescription.xml")
         })?;
         let (scene, folder) = read_scene(resources.as_deref())?;
-        Instance::new(arguments.version, scene, folder, &token)
+        Instance::new(arguments.version, scene, &folder, &token)
     });
     let made = made.unwrap_or_else(|panic| Err(internal(&panic)));
     match made {

@@ -1,6 +1,6 @@
 //! An instance of the FMU: the state machine around a simulation, the same for both standards.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use super::FmiVersion;
 use super::state::State;
@@ -50,8 +50,6 @@ pub(super) struct Instance {
     table: Table,
     /// The scene as JSON; parameters are overrides of it.
     scene: String,
-    /// Of the resources, for the files that the scene names.
-    folder: PathBuf,
     simulation: Simulation,
     phase: Phase,
     /// Importer's time at the simulation's time 0 [s].
@@ -71,12 +69,13 @@ pub(super) struct Instance {
 }
 
 impl Instance {
-    /// A new instance of a scene; `token` must be that of the description.
+    /// A new instance of a scene; `token` must be that of the description. Files that the scene names
+    /// are read here, from `folder`, and never again.
     ///
     /// # Errors
     /// Those of the scene and of setting it up, and a token of another scene or version.
-    pub fn new(version: FmiVersion, scene: String, folder: PathBuf, token: &str) -> Result<Self> {
-        let simulation = Simulation::new(Scene::from_json_in(&scene, &[], &folder)?)?;
+    pub fn new(version: FmiVersion, scene: String, folder: &Path, token: &str) -> Result<Self> {
+        let simulation = Simulation::new(Scene::from_json_in(&scene, &[], folder)?)?;
         let table = Table::new(&simulation, version)?;
         if table.token != token {
             return Err(Error::argument(format!(
@@ -90,7 +89,6 @@ impl Instance {
         let inputs = start_inputs(&table);
         Ok(Self {
             scene,
-            folder,
             simulation,
             phase: Phase::Instantiated,
             start: 0.0,
@@ -495,7 +493,7 @@ impl Instance {
             .filter(|(parameter, value)| **value != parameter.start)
             .filter_map(|(parameter, value)| parameter.scene_override(*value))
             .collect();
-        Scene::from_json_in(&self.scene, &overrides, &self.folder)
+        self.simulation.scene().again(&self.scene, &overrides)
     }
 
     fn build(&self, parameters: &[f64]) -> Result<Simulation> {

@@ -199,6 +199,17 @@ public:
         return get<urlsph_heat_resultant>(urlsph_get_heat_resultant, patch);
     }
 
+    /// Index of a plane of contact.
+    std::size_t contact(const std::string& name) const { return find(urlsph_find_contact, name); }
+    /// Name, point and normal of a plane of contact.
+    urlsph_contact_info contact_info(std::size_t contact) const {
+        return get<urlsph_contact_info>(urlsph_get_contact_info, contact);
+    }
+    /// Force [N], impulse [N s], displacement [m] and touching particles of a plane of contact.
+    urlsph_contact_resultant contact_resultant(std::size_t contact) const {
+        return get<urlsph_contact_resultant>(urlsph_get_contact_resultant, contact);
+    }
+
     /// Index of a field.
     std::size_t field(const std::string& name) const { return find(urlsph_find_field, name); }
     /// Name, unit, shape and configuration of a field.

@@ -32,9 +32,62 @@ pub struct Plan {
     pub off: Vec<String>,
 }
 
+/// Memory that a body holds per particle [bytes], before there is one: what [`Simulation::memory`]
+/// says afterwards. `neighbours` is the length of a particle's list inside the body.
+///
+/// [`Simulation::memory`]: crate::Simulation::memory
+pub(crate) fn bytes_per_particle(scene: &Scene, neighbours: f64) -> f64 {
+    let n = &scene.numerics;
+    let when = |is_on: bool, numbers: f64| if is_on { numbers } else { 0.0 };
+    let updated = n.reference_update != ReferenceUpdate::Never;
+    let lattice = scene.geometry.is_lattice();
+    let operators = n.operators_on(lattice);
+    let plastic = matches!(
+        scene.material,
+        Material::VonMises(_) | Material::JohnsonCook(_)
+    );
+    // x, v, f, and what the scene adds to them; they are kept twice, for the start of a step too.
+    let state = 15.0
+        + when(n.state != StateMeasures::F, 1.0)
+        + when(n.state == StateMeasures::Fhj, 9.0)
+        + when(scene.heat.is_some(), 1.0)
+        + when(plastic, 7.0);
+    // The initial positions, volumes, L, and the order.
+    let reference = 14.0
+        + when(updated, 13.0)
+        + when(updated && n.state == StateMeasures::Fhj, 9.0)
+        + when(operators == Operators::Repaired, 34.0)
+        + when(updated && operators == Operators::Repaired, 3.0);
+    // Q, the wave speed's, forces, grad v; S and the half gradient.
+    let rates = 23.0
+        + when(n.dissipation, 9.0)
+        + when(
+            n.dissipation && n.reconstruction != Reconstruction::None,
+            9.0,
+        )
+        + when(n.volume_dissipation > 0.0, 5.0)
+        + when(n.angular_momentum_projection, 3.0)
+        + when(scene.heat.is_some(), 3.0)
+        + when(
+            scene.heat.as_ref().is_some_and(|h| h.conductivity > 0.0),
+            6.0,
+        );
+    // Weights and half an index; vectors of pairs whose weights are not symmetric, or are an updated
+    // reference's; with the repair these are weights alone.
+    let stored = match operators {
+        Operators::Kernel => n.redoes_the_repair() || (n.weights == Weights::Tributary && !lattice),
+        Operators::Repaired => false,
+        Operators::Mesh => true,
+    };
+    let weights = n.redoes_the_repair() && operators == Operators::Repaired;
+    let pair = 1.125 + when(stored, 6.0) + when(weights, 1.0);
+    8.0 * (2.0 * state + reference + rates + neighbours * pair)
+}
+
 /// Physics and options that a scene has on and off.
 pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec<String>) {
     let n = &scene.numerics;
+    let lattice = scene.geometry.is_lattice();
     let mut on = vec![match &scene.material {
         Material::NeoHookean(_) => "neo-Hookean elasticity".to_string(),
         Material::MooneyRivlin(_) => "Mooney-Rivlin elasticity".to_string(),
@@ -43,8 +96,19 @@ pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec
         Material::JohnsonCook(_) => "Hencky elasticity, Johnson-Cook plasticity".to_string(),
     }];
     on.push(match n.neighbours {
-        Neighbours::Lattice(count) => format!("{count} lattice neighbours"),
-        Neighbours::Radius { radius } => format!("neighbours within {radius} spacings"),
+        Neighbours::Lattice(count) if lattice => format!("{count} lattice neighbours"),
+        Neighbours::Lattice(count) => format!(
+            "neighbours that share {} of the mesh",
+            match count {
+                6 => "an edge",
+                18 => "a face",
+                _ => "a cell",
+            }
+        ),
+        Neighbours::Radius { radius } if lattice => format!("neighbours within {radius} spacings"),
+        Neighbours::Radius { radius } => {
+            format!("neighbours within {radius} mean lengths of the edges")
+        }
     });
     on.push(match (operators, n.weights) {
         (Operators::Kernel, Weights::Unit) => "operators of the kernel, unit weights".to_string(),
@@ -150,4 +214,82 @@ pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec
     }
     feature(heat.source.is_some(), "heat source".to_string());
     (on, off)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Simulation;
+
+    /// What a scene is refused for is what it would have taken.
+    #[test]
+    fn memory_is_foreseen() {
+        const LATTICE: &str = r#"{"box": {"min": [0, 0, 0], "max": [1, 2, 1], "spacing": 0.0625}}"#;
+        const CYLINDER: &str = r#"{"cylinder": {"radius": 1, "length": 3, "axis": "z", "divisions": 5, "layers": 30}}"#;
+        const RUBBER: &str =
+            r#"{"neo_hookean": {"density": 1e3, "youngs_modulus": 1e7, "poisson_ratio": 0.3}}"#;
+        const STEEL: &str = r#"{"von_mises": {"density": 8e3, "youngs_modulus": 2e11, "poisson_ratio": 0.3, "yield_stress": 4e8}}"#;
+        const HEAT: &str =
+            r#", "heat": {"specific_heat": 500, "reference_temperature": 300, "conductivity": 40}"#;
+        let mesh = |name: &str| {
+            let root = env!("CARGO_MANIFEST_DIR");
+            format!(r#"{{"mesh": {{"file": "{root}/examples/meshes/{name}.msh"}}}}"#)
+        };
+        let (tetrahedra, hexahedra) = (mesh("cylinder_3"), mesh("cube_hexahedra"));
+        let all =
+            r#""state": "fhj", "volume_dissipation": 0.1, "angular_momentum_projection": true"#;
+        for (geometry, material, more, numerics) in [
+            (LATTICE, RUBBER, "", ""),
+            (LATTICE, RUBBER, "", r#""neighbours": 6"#),
+            (LATTICE, RUBBER, "", r#""neighbours": 26"#),
+            (LATTICE, RUBBER, "", r#""neighbours": {"radius": 1.5}"#),
+            (LATTICE, RUBBER, "", r#""neighbours": {"radius": 2.5}"#),
+            (LATTICE, RUBBER, "", r#""dissipation": false"#),
+            (LATTICE, RUBBER, "", all),
+            (LATTICE, RUBBER, HEAT, ""),
+            (LATTICE, STEEL, "", ""),
+            (LATTICE, STEEL, HEAT, all),
+            (LATTICE, RUBBER, "", r#""reference_update": "every_step""#),
+            (
+                LATTICE,
+                RUBBER,
+                "",
+                r#""reference_update": "every_step", "kernel_option": 4"#,
+            ),
+            (CYLINDER, STEEL, "", ""),
+            (
+                CYLINDER,
+                STEEL,
+                HEAT,
+                r#""reference_update": {"every": 5}, "kernel_option": 3"#,
+            ),
+            (
+                CYLINDER,
+                RUBBER,
+                "",
+                r#""operators": "kernel", "weights": "tributary""#,
+            ),
+            (&tetrahedra, RUBBER, "", ""),
+            (&tetrahedra, RUBBER, "", r#""operators": "mesh""#),
+            (&hexahedra, STEEL, HEAT, ""),
+            (&hexahedra, STEEL, "", r#""neighbours": 6"#),
+        ] {
+            let text = format!(
+                r#"{{"geometry": {geometry}, "material": {material}{more}, "boundary": {{}},
+                    "numerics": {{{numerics}}}, "time": {{"end": 1}}}}"#
+            );
+            let scene = Scene::from_json(&text, &[]).expect("a good scene");
+            let bytes = scene.bytes().expect("it has a size");
+            let simulation = Simulation::with_threads(scene, 1).expect("it can be set up");
+            let ratio = bytes / simulation.memory() as f64;
+            println!(
+                "{:>6} particles, {:>4.0} bytes per particle, foreseen {ratio:.3} of that (tolerance \
+                 0.9 to 1.3): {}{more} {numerics}",
+                simulation.particle_count(),
+                simulation.memory() as f64 / simulation.particle_count() as f64,
+                &geometry[..12]
+            );
+            assert!((0.9..1.3).contains(&ratio), "{text}");
+        }
+    }
 }

@@ -54,13 +54,9 @@ pub struct Simulation {
     evaluation: Evaluation,
     resultants: Resultants,
     generation: u64,
-    /// Stable step at time 0 [s].
-    first_step: f64,
+    /// Length that bounds the step at time 0 [m].
+    first_length: f64,
 }
-
-/// Share of the first stable step below which a body counts as broken. A compression to a thousandth
-/// of each particle's size is far beyond what the particles resolve, and going on would not end.
-const SMALLEST_STEP: f64 = 1e-6;
 
 /// Largest decay rate times step of convection; the three stages are stable up to 2.51.
 const CONVECTION_STEPS: f64 = 2.0;
@@ -175,7 +171,7 @@ impl Simulation {
             evaluation: Evaluation::default(),
             resultants: Resultants::default(),
             generation: 0,
-            first_step: 0.0,
+            first_length: 0.0,
             scene,
         };
         let supplied = this.first_impulse()?;
@@ -196,7 +192,7 @@ impl Simulation {
             );
             error.at_particle(place.particle.unwrap_or(0), place.position)
         })?;
-        this.first_step = this.stable_step();
+        this.first_length = this.evaluation.length;
         let e = &this.evaluation;
         this.accounts.initial = e.kinetic + e.strain + e.thermal - supplied;
         this.resultants = this.compute_resultants()?;
@@ -317,10 +313,11 @@ impl Simulation {
         linear.min(1.0 / decay)
     }
 
-    /// The CFL number alpha of the scene, or the default for its neighbours.
+    /// The CFL number alpha of the scene, or the default for its neighbours and its Poisson ratio.
     pub fn cfl_number(&self) -> f64 {
         let (_, most) = self.reference.neighbour_range;
-        self.scene.numerics.cfl_number(most)
+        let (_, [_, _, poisson_ratio]) = self.scene.material.elastic();
+        self.scene.numerics.cfl_number(most, poisson_ratio)
     }
 
     /// Advances to exactly `t_next`, in as many stable steps as needed.
@@ -381,16 +378,10 @@ impl Simulation {
                 stable.min(0.5 * remaining)
             };
             let time = if last { t_next } else { self.time + dt };
-            if time <= self.time || stable < SMALLEST_STEP * self.first_step {
-                return Err(Error::new(
-                    Code::Diverged,
-                    format!(
-                        "the stable step, {stable:e} s, is too small to advance the time: the body \
-                         is compressed beyond what its particles resolve; refine the spacing or \
-                         reduce the load"
-                    ),
-                )
-                .at_time(self.time));
+            let share = self.evaluation.length / self.first_length;
+            let fixed = self.scene.numerics.time_step.is_some();
+            if time <= self.time || (!fixed && share < self.scene.numerics.smallest_step()) {
+                return Err(self.collapsed(stable, share));
             }
             self.step(dt, time)?;
             let progress = Progress {
@@ -406,6 +397,41 @@ impl Simulation {
             }
         }
         Ok(())
+    }
+
+    /// Why the stable step is too small to go on.
+    #[cold]
+    fn collapsed(&self, stable: f64, share: f64) -> Error {
+        let (state, reference) = (&self.state, &self.reference);
+        let caller = |slot: usize| self.order[slot - Layout::FIRST];
+        let narrow = self.url.narrowest(state, reference);
+        let slot = narrow.slot;
+        let what = match narrow.pair {
+            Some((other, closer, deformed)) if closer < 0.5 * deformed => format!(
+                "particles {} and {} have come together to {closer:.1e} of their first distance \
+                 while the deformation around them gives {deformed:.1e}, so that they are on the way \
+                 past each other: raise numerics.dissipation_coefficient if it is below 1, refine the \
+                 spacing, try numerics.operators \"repaired\" or 6 neighbours under high pressure, \
+                 or reduce the load",
+                caller(slot),
+                caller(other),
+            ),
+            _ => format!(
+                "the body is compressed beyond what its particles resolve, here to {:.1e} of its \
+                 first thickness: refine the spacing or reduce the load",
+                narrow.stretch
+            ),
+        };
+        Error::new(
+            Code::Diverged,
+            format!(
+                "the stable step fell to {stable:.2e} s, {share:.1e} of the first one, and \
+                 numerics.smallest_step is {:.1e}: {what}",
+                self.scene.numerics.smallest_step()
+            ),
+        )
+        .at_particle(caller(slot) as usize, Some(state.x.get(slot)))
+        .at_time(self.time)
     }
 
     /// THE time step: three stages of rates, loads, blend, supports.
@@ -667,6 +693,14 @@ impl Simulation {
     /// Names of the scene's planes of contact, in the order of [`contact`](Self::contact).
     pub fn contact_names(&self) -> impl Iterator<Item = &str> {
         self.boundary.wall_names()
+    }
+
+    /// A point of a plane of contact at time 0 [m], and its unit normal.
+    ///
+    /// # Panics
+    /// If `wall` is not an index into [`contact_names`](Self::contact_names).
+    pub fn contact_plane(&self, wall: usize) -> ([f64; 3], [f64; 3]) {
+        self.boundary.wall_plane(wall)
     }
 
     /// What a plane of contact does now, and has done since time 0.

@@ -209,6 +209,167 @@ fn check_prints_the_plan_and_writes_nothing() {
     assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), 1);
 }
 
+/// A scene on a mesh of `examples/meshes`, beside a copy of the mesh.
+fn meshed(mesh: &str, more: &str) -> Bench {
+    let bench = Bench::new();
+    let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/meshes");
+    fs::create_dir(bench.path("meshes")).unwrap();
+    fs::copy(meshes.join(mesh), bench.path("meshes").join(mesh)).unwrap();
+    let mut scene: serde_json::Value = serde_json::from_str(SCENE).unwrap();
+    scene["geometry"] = serde_json::json!({ "mesh": { "file": format!("meshes/{mesh}") } });
+    for part in ["patches", "boundary", "probes"] {
+        scene.as_object_mut().unwrap().remove(part);
+    }
+    let more: serde_json::Value = serde_json::from_str(more).unwrap();
+    for (key, value) in more.as_object().unwrap() {
+        scene[key] = value.clone();
+    }
+    fs::write(bench.path("scene.json"), scene.to_string()).unwrap();
+    bench
+}
+
+/// The lines of a plan that have a name.
+fn lines<'a>(plan: &'a str, name: &str) -> Vec<&'a str> {
+    let named = plan.lines().filter_map(|l| l.split_once(' '));
+    named
+        .filter(|(n, _)| *n == name)
+        .map(|(_, text)| text.trim())
+        .collect()
+}
+
+#[test]
+fn check_tells_what_is_in_a_mesh() {
+    let bar = meshed(
+        "bar_2.msh",
+        r#"{"geometry": {"mesh": {"file": "meshes/bar_2.msh", "scale": 1e-3}},
+            "boundary": {"start": {"support": "roller"}, "end": {"support": "roller"}},
+            "contact": {"wall": {"point": [0, 0, 0], "normal": [0, 0, 1]}}}"#,
+    );
+    let plan = bar.succeeds(&["check", "scene.json"]);
+    assert_eq!(lines(&plan, "particles"), ["730"]);
+    let cells = lines(&plan, "cells")[0];
+    assert!(
+        cells.contains(" tetrahedra; volume ") && cells.contains("shortest edge"),
+        "{cells}"
+    );
+    let repair = lines(&plan, "repair")[0];
+    assert!(
+        repair.contains("pseudo-areas changed by") && repair.contains("iterations"),
+        "{repair}"
+    );
+    let on = lines(&plan, "on");
+    assert!(
+        on.contains(&"neighbours that share a face of the mesh"),
+        "{on:?}"
+    );
+    assert!(on.contains(&"operators of the kernel, repaired"), "{on:?}");
+    assert!(on.contains(&"contact with rigid planes"), "{on:?}");
+    assert!(!plan.contains("lattice"), "{plan}");
+    let patches = lines(&plan, "patch");
+    assert!(
+        patches.iter().any(|p| p.starts_with("start: ")),
+        "{patches:?}"
+    );
+
+    let set = |value: &str| bar.succeeds(&["check", "scene.json", "--set", value]);
+    for (value, said) in [
+        (
+            "numerics.neighbours=6",
+            "neighbours that share an edge of the mesh",
+        ),
+        (
+            "numerics.neighbours=26",
+            "neighbours that share a cell of the mesh",
+        ),
+        (
+            "numerics.neighbours.radius=1.4",
+            "neighbours within 1.4 mean lengths of the edges",
+        ),
+        ("numerics.operators=mesh", "operators of the mesh"),
+    ] {
+        let plan = set(value);
+        assert!(lines(&plan, "on").contains(&said), "{value}: {plan}");
+    }
+    let plan = set("numerics.operators=mesh");
+    assert!(lines(&plan, "repair").is_empty(), "{plan}");
+
+    let box_ = Bench::new().succeeds(&["check", "scene.json"]);
+    assert!(
+        lines(&box_, "on").contains(&"18 lattice neighbours"),
+        "{box_}"
+    );
+    assert!(lines(&box_, "cells").is_empty() && lines(&box_, "mesh").is_empty());
+}
+
+#[test]
+fn check_tells_what_of_a_mesh_is_left_out() {
+    let bench = meshed("cube_hexahedra.msh", "{}");
+    let path = bench.path("meshes/cube_hexahedra.msh");
+    // A node that no cell uses.
+    let text = fs::read_to_string(&path).unwrap();
+    let text = text
+        .replace("$Nodes\n343\n", "$Nodes\n344\n")
+        .replace("$EndNodes", "1000 9 9 9\n$EndNodes");
+    fs::write(&path, text).unwrap();
+    let plan = bench.succeeds(&["check", "scene.json"]);
+    assert_eq!(lines(&plan, "particles"), ["343"]);
+    assert!(
+        lines(&plan, "cells")[0].starts_with("216 hexahedra; "),
+        "{plan}"
+    );
+    let notes = lines(&plan, "mesh");
+    assert!(notes.len() == 1 && notes[0].contains("1 node"), "{plan}");
+
+    fs::write(&path, "no mesh").unwrap();
+    let message = bench.fails(1, &["check", "scene.json"]);
+    for word in ["geometry.mesh.file", "cube_hexahedra.msh", "line 1"] {
+        assert!(message.contains(word), "{word} in: {message}");
+    }
+    fs::remove_file(&path).unwrap();
+    let message = bench.fails(1, &["check", "scene.json"]);
+    assert!(message.contains("cube_hexahedra.msh"), "{message}");
+}
+
+#[test]
+fn meshes_run() {
+    for mesh in [
+        "bar_1.msh",
+        "cylinder_1.msh",
+        "cube_tetrahedra.msh",
+        "cube_hexahedra.msh",
+    ] {
+        let bench = meshed(
+            mesh,
+            r#"{"initial": {"velocity": ["Y", 0, 0]}, "time": {"end": 1e-3},
+                "output": {"history_interval": 5e-4, "field_interval": 1e-3}}"#,
+        );
+        bench.succeeds(&["run", "scene.json", "--out", "r", "--threads", "1"]);
+        let (header, rows) = history(&bench.path("r/history.csv"));
+        let of = |name: &str| header.iter().position(|h| h == name).unwrap();
+        let momentum = of("momentum.linear[1]");
+        assert_eq!(rows.len(), 3);
+        // Nothing pushes the body.
+        let (first, last) = (rows[0][momentum], rows[2][momentum]);
+        println!(
+            "{mesh}: momentum {first:e}, then {:e} of it (tolerance 1e-12)",
+            last / first - 1.0
+        );
+        assert!(
+            (last / first - 1.0).abs() < 1e-12,
+            "{mesh}: {first} and {last}"
+        );
+        let bytes = fs::read(bench.path("r/fields/state_000001.vtu")).unwrap();
+        assert!(bytes.ends_with(b"</VTKFile>\n"));
+        // What was run can be run again from where its scene lies.
+        bench.succeeds(&["run", "r/scene.json", "--out", "again", "--threads", "2"]);
+        for file in ["history.csv", "fields/state_000001.vtu"] {
+            let [first, again] =
+                ["r", "again"].map(|r| fs::read(bench.path(r).join(file)).unwrap());
+            assert!(first == again, "{mesh}: {file} differs");
+        }
+    }
+}
+
 #[test]
 fn schema_is_json_that_names_the_parts_of_a_scene() {
     let schema: serde_json::Value =

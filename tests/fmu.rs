@@ -362,11 +362,8 @@ fn the_packager_names_what_is_wrong() {
     assert_eq!(left, ["wrong.so"]);
 }
 
-#[test]
-fn an_fmu_carries_its_mesh() {
-    let folder = TempDir::new().unwrap();
-    let mesh = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/meshes/cube_hexahedra.msh");
-    std::fs::copy(mesh, folder.path().join("cube.msh")).unwrap();
+/// A cube of hexahedra, 2 m wide, on the mesh that `cube.msh` in a folder is.
+fn meshed(folder: &Path) -> Scene {
     let text = SCENE
         .replace(
             r#"{"box": {"min": [0, 0, 0], "max": [1, 3, 1], "spacing": 0.5}}"#,
@@ -374,11 +371,99 @@ fn an_fmu_carries_its_mesh() {
         )
         .replace(r#""per_particle": true"#, r#""per_particle": false"#)
         .replace("[0.5, 3, 0.5]", "[0.5, 2, 0.5]");
-    let scene = Scene::from_json_in(&text, &[], folder.path()).unwrap();
+    Scene::from_json_in(&text, &[], folder).unwrap()
+}
+
+/// The mesh file in a folder of its own.
+fn folder_with_mesh() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    let mesh = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/meshes/cube_hexahedra.msh");
+    std::fs::copy(mesh, folder.path().join("cube.msh")).unwrap();
+    folder
+}
+
+/// An FMU of a mesh, moved away from where it was made, with nothing left there; and the body in the
+/// library itself.
+fn moved_away(version: FmiVersion) -> (TempDir, PathBuf, Simulation) {
+    let folder = folder_with_mesh();
+    let scene = meshed(folder.path());
     let path = folder.path().join("cube.fmu");
-    fmu::package(&scene, FmiVersion::V3, &fmu::find_library().unwrap(), &path).unwrap();
-    // What the scene was made from is not needed any more.
-    std::fs::remove_file(folder.path().join("cube.msh")).unwrap();
-    let three = Three::new(&path);
-    assert_eq!(three.step(0.0, 1e-4), fmi3Status::Ok);
+    fmu::package(&scene, version, &fmu::find_library().unwrap(), &path).unwrap();
+    let away = TempDir::new().unwrap();
+    let moved = away.path().join("elsewhere.fmu");
+    std::fs::copy(&path, &moved).unwrap();
+    folder.close().unwrap();
+    (away, moved, Simulation::new(scene).unwrap())
+}
+
+#[test]
+fn fmi3_carries_its_mesh() {
+    let (_away, path, mut simulation) = moved_away(FmiVersion::V3);
+    let fmu = Three::new(&path);
+    assert_eq!(fmu.step(0.0, 1e-3), fmi3Status::Ok);
+    // Another material; the importer has removed the files that it unpacked.
+    assert_eq!(fmu.fmu.reset(), fmi3Status::Ok);
+    let density = fmu.reference("material.density");
+    assert_eq!(fmu.fmu.setFloat64(&[density], &[2200.0]), fmi3Status::Ok);
+    let initialized = fmu.fmu.enterInitializationMode(None, 0.0, Some(0.05));
+    assert_eq!(initialized, fmi3Status::Ok);
+    assert_eq!(fmu.fmu.exitInitializationMode(), fmi3Status::Ok);
+    let total: f64 = fmu.get::<49>("boundary.y_max.area").iter().sum();
+    assert!((total - 4.0).abs() < 1e-12, "{total}");
+    assert_eq!(fmu.step(0.0, 1e-3), fmi3Status::Ok);
+    let heavy: [f64; 3] = fmu.get("probe.tip.displacement");
+
+    let fmu = Three::new(&path);
+    assert_eq!(fmu.step(0.0, 1e-3), fmi3Status::Ok);
+    simulation.advance(1e-3).unwrap();
+    let light = simulation.probe(0).displacement;
+    assert_eq!(fmu.get("probe.tip.displacement"), light);
+    assert!(light[0] > heavy[0] && heavy[0] > 0.0, "{light:?} {heavy:?}");
+}
+
+#[test]
+fn fmi2_carries_its_mesh() {
+    let (_away, path, mut simulation) = moved_away(FmiVersion::V2);
+    let fmu = Two::new(&path);
+    assert_eq!(fmu.step(0.0, 1e-3), fmi2Status::Ok);
+    simulation.advance(1e-3).unwrap();
+    assert_eq!(
+        fmu.get("probe.tip.displacement"),
+        simulation.probe(0).displacement
+    );
+}
+
+#[test]
+fn an_fmu_does_not_tell_where_its_mesh_was() {
+    let (first, second) = (folder_with_mesh(), folder_with_mesh());
+    for version in [FmiVersion::V2, FmiVersion::V3] {
+        let bytes = [&first, &second].map(|folder| {
+            let path = folder.path().join("cube.fmu");
+            let library = fmu::find_library().unwrap();
+            fmu::package(&meshed(folder.path()), version, &library, &path).unwrap();
+            std::fs::read(path).unwrap()
+        });
+        assert!(bytes[0] == bytes[1], "{version:?}: the bytes differ");
+    }
+}
+
+#[test]
+fn a_mesh_that_has_changed_or_gone_is_an_error_of_the_packager() {
+    let folder = folder_with_mesh();
+    let scene = meshed(folder.path());
+    let out = folder.path().join("cube.fmu");
+    let library = fmu::find_library().unwrap();
+    let mesh = folder.path().join("cube.msh");
+    for said in ["has changed", "cannot be read"] {
+        if said == "has changed" {
+            std::fs::write(&mesh, "another one").unwrap();
+        } else {
+            std::fs::remove_file(&mesh).unwrap();
+        }
+        let error = fmu::package(&scene, FmiVersion::V3, &library, &out).unwrap_err();
+        assert_eq!(error.code(), Code::Io);
+        let text = error.to_string();
+        assert!(text.contains("cube.msh") && text.contains(said), "{text}");
+        assert!(!out.exists());
+    }
 }

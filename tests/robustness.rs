@@ -107,7 +107,7 @@ fn the_default_step_follows_the_neighbours_that_there_are() {
         six.pair_count(),
         block(&["numerics.neighbours=6"]).pair_count()
     );
-    assert_eq!((six.cfl_number(), block(&[]).cfl_number()), (0.6, 0.9));
+    assert_eq!((six.cfl_number(), block(&[]).cfl_number()), (0.45, 0.9));
 }
 
 /// A prescribed velocity needs a value at its own time only.

@@ -391,7 +391,8 @@ fn everything() -> Value {
         "numerics": {
             "neighbours": {"radius": 1.8}, "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
-            "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3
+            "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3,
+            "smallest_step": 0.01
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
@@ -670,6 +671,8 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.cfl=0", S, "numerics.cfl", &["more than 0"]),
         ("numerics.cfl=2.5", S, "numerics.cfl", &["at most 2"]),
         ("numerics.time_step=0", S, "numerics.time_step", &["above 0"]),
+        ("numerics.smallest_step=-0.1", S, "numerics.smallest_step", &["0 or more"]),
+        ("numerics.smallest_step=1", S, "numerics.smallest_step", &["less than 1"]),
         ("numerics={\"time_step\": 1e-5, \"cfl\": 0.5}", S, "numerics.time_step", &["not both"]),
         // Time, probes, output.
         ("time.end=0", S, "time.end", &["above 0"]),
@@ -940,4 +943,59 @@ fn the_schema_accepts_what_the_parser_accepts() {
         assert!(!ok(&scene), "{pointer} = {bad} is accepted by the schema");
         assert!(Scene::from_json(&scene.to_string(), &[]).is_err());
     }
+}
+
+/// What the README shows is valid: its scene, its geometries, and its conditions on that scene.
+#[test]
+fn the_scenes_of_the_readme_are_valid() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let readme = std::fs::read_to_string(format!("{root}/README.md")).unwrap();
+    // As the text says: comments are not part of JSON.
+    let blocks: Vec<String> = readme
+        .split("```jsonc\n")
+        .skip(1)
+        .map(|rest| {
+            let block = rest.split("```").next().unwrap();
+            let lines = block.lines().map(|l| l.split("//").next().unwrap());
+            lines.collect::<Vec<_>>().join("\n")
+        })
+        .collect();
+    let [scene, geometries, conditions] = &blocks[..] else {
+        panic!("{} blocks", blocks.len());
+    };
+    let scene: Value = serde_json::from_str(scene).unwrap();
+    let valid = |scene: &Value| {
+        Scene::from_json(&scene.to_string(), &[]).unwrap_or_else(|e| panic!("{e}: {scene}"))
+    };
+    valid(&scene);
+
+    let mut with = scene.clone();
+    let conditions: Value = serde_json::from_str(&format!("{{{conditions}}}")).unwrap();
+    for (key, value) in conditions.as_object().unwrap() {
+        with[key] = value.clone();
+    }
+    valid(&with);
+
+    let place = |min: i32| {
+        format!(
+            r#"{{"min": [{min}, 0, 0], "max": [{}, 1, 1], "spacing": 0.5}}"#,
+            min + 1
+        )
+    };
+    let geometries = geometries
+        .replacen("{...}", &place(0), 1)
+        .replacen("{...}", &place(1), 1)
+        .replace("bar.msh", &format!("{root}/examples/meshes/bar_1.msh"));
+    let mut bare = json!({ "boundary": {}, "time": { "end": 1 } });
+    bare["material"] = scene["material"].clone();
+    let mut kinds = Vec::new();
+    for geometry in serde_json::Deserializer::from_str(&geometries).into_iter::<Value>() {
+        bare["geometry"] = geometry.unwrap();
+        valid(&bare);
+        kinds.extend(bare["geometry"].as_object().unwrap().keys().cloned());
+    }
+    assert_eq!(
+        kinds,
+        ["box", "boxes", "cylinder", "perforated_box", "mesh"]
+    );
 }

@@ -81,7 +81,8 @@ gmsh.initialize()
 gmsh.option.setNumber("General.Terminal", 0)
 for name, h, binary in [("bar_1.msh", 1.3, False), ("bar_2.msh", 0.95, True), ("bar_3.msh", 0.72, True)]:
     cylinder(name, 3.2, 32.4, math.pi / 2, h, binary)
-for name, h in [("cylinder_1.msh", 0.23), ("cylinder_2.msh", 0.17), ("cylinder_3.msh", 0.138)]:
+cylinders = [0.23, 0.17, 0.138, 0.11]
+for name, h in [(f"cylinder_{i + 1}.msh", h) for i, h in enumerate(cylinders)]:
     cylinder(name, 0.5, 3, 2 * math.pi, h, True)
 cube("cube_tetrahedra.msh", 6, False)
 cube("cube_hexahedra.msh", 6, True)

@@ -20,6 +20,7 @@ from urlsph import _library, _simulation
 
 SCENE = Path(__file__).parents[1] / "scene.json"
 METAL = SCENE.with_name("metal.json")
+CONTACT = SCENE.with_name("contact.json")
 ROOT = SCENE.parents[1]
 
 
@@ -32,6 +33,12 @@ def column():
 @pytest.fixture
 def metal():
     with urlsph.Simulation(METAL, threads=2) as simulation:
+        yield simulation
+
+
+@pytest.fixture
+def block():
+    with urlsph.Simulation(CONTACT, threads=2) as simulation:
         yield simulation
 
 
@@ -63,7 +70,7 @@ def test_quantity_numbers_are_those_of_the_header():
     assert numbers == _simulation._QUANTITIES
 
 
-def test_structs_are_as_large_as_the_library_has_them(metal):
+def test_structs_are_as_large_as_the_library_has_them(metal, block):
     structs = {
         "urlsph_get_counts": (_library.CountsStruct, ()),
         "urlsph_get_energies": (_library.EnergiesStruct, ()),
@@ -77,10 +84,13 @@ def test_structs_are_as_large_as_the_library_has_them(metal):
         "urlsph_get_probe_motion": (_library.ProbeMotionStruct, (0,)),
         "urlsph_get_input_info": (_library.InputInfoStruct, (0,)),
         "urlsph_set_callbacks": (_library.CallbacksStruct, ()),
+        "urlsph_get_contact_info": (_library.ContactInfoStruct, (0,)),
+        "urlsph_get_contact_resultant": (_library.ContactResultantStruct, (0,)),
     }
     for name, (struct, index) in structs.items():
+        simulation = block if "contact" in name else metal
         with pytest.raises(urlsph.InvalidArgumentError) as e:
-            metal._call(getattr(_library.lib, name), *index, struct(), 1)
+            simulation._call(getattr(_library.lib, name), *index, struct(), 1)
         assert f"{ctypes.sizeof(struct)} bytes" in str(e.value), name
 
 
@@ -301,6 +311,26 @@ def test_a_body_without_heat_has_no_temperature(column):
         column.heat_resultant("top")
 
 
+def test_contact(block, column):
+    assert list(block.contacts) == ["floor", "piston"]
+    # The scene's normal is twice as long.
+    np.testing.assert_array_equal(block.contacts["floor"].normal, [0.0, 1.0, 0.0])
+    np.testing.assert_array_equal(block.contacts["piston"].point, [0.0, 2.001, 0.0])
+    floor = block.contact_resultant("floor")
+    assert floor.particles == 9 and block.contact_resultant("piston").particles == 0
+    np.testing.assert_allclose(floor.impulse, [0.0, 275.0, 0.0], rtol=1e-12)
+    block.step(4e-3)
+    floor, piston = block.contact_resultant("floor"), block.contact_resultant("piston")
+    change = block.momenta.linear - [0.0, -2200.0, 0.0]
+    np.testing.assert_allclose(floor.impulse + piston.impulse, change, atol=1e-8)
+    assert piston.displacement == pytest.approx(8e-3, rel=1e-12)
+    assert floor.force[1] > 0 > piston.force[1]
+    assert block.energies.contact_dissipation > 0
+    with pytest.raises(urlsph.InvalidArgumentError, match="floor, piston"):
+        block.contact_resultant("wall")
+    assert column.contacts == {}
+
+
 def test_step(column):
     column.set_traction("top", [1e4, 0.0, 0.0])
     column.step(1e-3)
@@ -442,6 +472,24 @@ def test_ctrl_c_ends_a_step(column):
         thread.join()
         signal.signal(signal.SIGINT, inherited)
     column.step(1e-5)
+
+
+README = (ROOT / "include" / "python" / "README.md").read_text()
+READMES = README + (ROOT / "README.md").read_text()
+
+
+@pytest.mark.parametrize("program", re.findall(r"```python\n(.*?)```", READMES, re.DOTALL))
+def test_what_the_readme_shows(program, tmp_path, monkeypatch):
+    scenes = [("column", SCENE), ("scene", SCENE), ("part", METAL), ("block", CONTACT)]
+    for name, scene in scenes:
+        (tmp_path / f"{name}.json").write_text(scene.read_text())
+    monkeypatch.chdir(tmp_path)
+    exec(compile(program, "README.md", "exec"), {})
+
+
+def test_the_readme_names_all_energies():
+    for name in urlsph.Energies._fields:
+        assert f"`{name}`" in README, name
 
 
 def test_loading_errors_name_the_remedy(tmp_path):

@@ -98,6 +98,12 @@ SCENES = {
         },
         output={"fields": ["deformation_gradient", "von_mises_stress", "initial_position"]},
     ),
+    "meshed": column(
+        geometry={"mesh": {"file": "mesh/cube.msh"}},
+        probes={"tip": [0.5, 1.0, 0.5]},
+        initial={"velocity": ["Y", 0, -1]},
+        contact={"floor": {"point": [0, 0, -1e-3], "normal": [0, 0, 1]}},
+    ),
 }
 
 
@@ -119,8 +125,13 @@ def export(urlsph, tmp_path_factory):
             scene = folder / f"{name}.json"
             scene.write_text(json.dumps(SCENES[name]))
             fmu = folder / f"{name}{version}{'_again' if again else ''}.fmu"
+            # Beside the scene while the FMU is made, and gone afterwards.
+            mesh = folder / "mesh"
+            mesh.mkdir()
+            shutil.copy(ROOT / "examples" / "meshes" / "cube_tetrahedra.msh", mesh / "cube.msh")
             subprocess.run(
                 [urlsph, "fmu", scene, "--output", fmu, "--fmi", str(version)], check=True)
+            shutil.rmtree(mesh)
             if again:
                 return str(fmu)
             made[name, version] = str(fmu)

@@ -13,7 +13,7 @@ from fmpy import platform, platform_tuple, read_model_description, supported_pla
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from conftest import SCENES
+from conftest import ROOT, SCENES
 from driver import only_fmi3
 from functions import FMI2, FMI3
 
@@ -66,9 +66,19 @@ def test_contents(export, version):
     assert supported_platforms(export("column", version)) != []
 
 
-def test_same_scene_same_bytes(export, version):
-    first = Path(export("column", version)).read_bytes()
-    assert Path(export("column", version, again=True)).read_bytes() == first
+@pytest.mark.parametrize("name", ["column", "meshed"])
+def test_same_scene_same_bytes(export, version, name):
+    first = Path(export(name, version)).read_bytes()
+    assert Path(export(name, version, again=True)).read_bytes() == first
+
+
+def test_a_mesh_travels_with_its_fmu(export, version):
+    with zipfile.ZipFile(export("meshed", version)) as archive:
+        scene = json.loads(archive.read("resources/scene.json"))
+        # A name without a folder: the resources may lie anywhere.
+        assert scene["geometry"]["mesh"]["file"] == "mesh.msh"
+        original = ROOT / "examples" / "meshes" / "cube_tetrahedra.msh"
+        assert archive.read("resources/mesh.msh") == original.read_bytes()
 
 
 def test_tokens_tell_scenes_and_versions_apart(export):

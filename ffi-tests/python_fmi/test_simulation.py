@@ -47,6 +47,19 @@ def test_both_versions_give_the_same_bits(start):
         assert np.array_equal(two.get(name), three.get(name)), name
 
 
+@only_fmi3
+def test_a_mesh_on_a_plane(start):
+    two, three = start("meshed", fmi=2), start("meshed", fmi=3)
+    for driver in (two, three):
+        assert driver.get("contact.floor.particles") == 0
+        driver.run(4e-3, 1e-3)
+        assert driver.get("contact.floor.particles") > 0
+    force, impulse = three.get("contact.floor.force"), three.get("contact.floor.impulse")
+    assert force[2] > 0 and impulse[2] > 0 and force[0] == force[1] == impulse[0] == 0
+    for name in ["contact.floor.impulse", "probe.tip.displacement", "energy.contact_dissipation"]:
+        assert np.array_equal(two.get(name), three.get(name)), name
+
+
 @only_fmi2
 def test_fmu_agrees_with_the_command_line(urlsph, export, start, tmp_path):
     """The outputs of the FMU are the columns of the history of a run."""

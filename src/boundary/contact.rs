@@ -223,6 +223,12 @@ impl Boundary {
         self.walls.iter().map(|wall| wall.name.as_str())
     }
 
+    /// A point of a plane at time 0 [m], and its unit normal.
+    pub fn wall_plane(&self, wall: usize) -> ([f64; 3], [f64; 3]) {
+        let wall = &self.walls[wall];
+        (wall.point, wall.normal)
+    }
+
     /// What the planes have done, without what touches them now.
     pub(super) fn resting_contacts(&self, walls: &[WallState]) -> Vec<ContactResultant> {
         let resultant = |(wall, state): (&Wall, &WallState)| ContactResultant {

@@ -29,6 +29,7 @@ pub(super) struct Session {
 pub(super) struct Names {
     pub(super) title: CString,
     pub(super) patches: Vec<CString>,
+    pub(super) contacts: Vec<CString>,
     pub(super) probes: Vec<CString>,
     pub(super) fields: Vec<FieldNames>,
 }
@@ -52,6 +53,10 @@ impl Names {
                 .patches()
                 .iter()
                 .map(|p| text("patches", &p.name))
+                .collect::<Result<_>>()?,
+            contacts: simulation
+                .contact_names()
+                .map(|name| text("contact", name))
                 .collect::<Result<_>>()?,
             probes: simulation
                 .probe_names()

@@ -5,9 +5,10 @@ use std::ffi::c_char;
 use super::args::{buffer, put, put_struct, text};
 use super::handle::with;
 use super::types::{
-    urlsph_configuration, urlsph_counts, urlsph_energies, urlsph_field_info, urlsph_heat_resultant,
-    urlsph_input_info, urlsph_momenta, urlsph_patch_info, urlsph_probe_info, urlsph_probe_motion,
-    urlsph_quantity, urlsph_resultant, urlsph_simulation, urlsph_status, urlsph_view,
+    urlsph_configuration, urlsph_contact_info, urlsph_contact_resultant, urlsph_counts,
+    urlsph_energies, urlsph_field_info, urlsph_heat_resultant, urlsph_input_info, urlsph_momenta,
+    urlsph_patch_info, urlsph_probe_info, urlsph_probe_motion, urlsph_quantity, urlsph_resultant,
+    urlsph_simulation, urlsph_status, urlsph_view,
 };
 use crate::boundary::{Patch, Quantity};
 use crate::error::{Error, Result};
@@ -105,7 +106,7 @@ pub unsafe extern "C" fn urlsph_get_title(
     })
 }
 
-/// Numbers of particles, pairs, patches, fields, probes, inputs, threads and steps.
+/// Numbers of particles, pairs, patches, fields, probes, inputs, threads, steps and planes of contact.
 ///
 /// - `counts`, `counts_size`: receives them; the size of the struct.
 ///
@@ -127,6 +128,7 @@ pub unsafe extern "C" fn urlsph_get_counts(
             inputs: simulation.inputs().len(),
             threads: simulation.threads(),
             steps: simulation.steps(),
+            contacts: session.names.contacts.len(),
         };
         // SAFETY: the caller's pointer, as the header's preamble demands.
         unsafe { put_struct(counts, counts_size, &value, "counts") }
@@ -402,6 +404,83 @@ pub unsafe extern "C" fn urlsph_get_heat_resultant(
             heat_flow: r.heat_flow,
             mean_temperature: r.mean_temperature,
             maximum_temperature: r.maximum_temperature,
+        };
+        // SAFETY: the caller's pointer, as the header's preamble demands.
+        unsafe { put_struct(resultant, resultant_size, &value, "resultant") }
+    })
+}
+
+// Planes of contact.
+
+/// Index of the plane of contact of this name.
+///
+/// - `name`: NUL-terminated UTF-8, the key of the plane in the scene's section `contact`.
+/// - `contact`: receives the index, 0-based.
+///
+/// Errors: `URLSPH_INVALID_ARGUMENT` with the names that there are; `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_find_contact(
+    simulation: *const urlsph_simulation,
+    name: *const c_char,
+    contact: *mut usize,
+) -> urlsph_status {
+    with(simulation, |session| {
+        let names: Vec<&str> = session.simulation()?.contact_names().collect();
+        // SAFETY: the caller's pointers, as the header's preamble demands.
+        unsafe {
+            let index = find(names.into_iter(), text(name, "name")?, "plane of contact")?;
+            put(contact, index, "contact")
+        }
+    })
+}
+
+/// Name, point and normal of a plane of contact.
+///
+/// - `contact`: index, less than `urlsph_counts.contacts`.
+/// - `info`, `info_size`: receives them; the size of the struct.
+///
+/// Errors: `URLSPH_INVALID_ARGUMENT`, `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_get_contact_info(
+    simulation: *const urlsph_simulation,
+    contact: usize,
+    info: *mut urlsph_contact_info,
+    info_size: usize,
+) -> urlsph_status {
+    with(simulation, |session| {
+        let name = at(&session.names.contacts, contact, "plane of contact")?;
+        let (point, normal) = session.simulation()?.contact_plane(contact);
+        let value = urlsph_contact_info {
+            name: name.as_ptr(),
+            point,
+            normal,
+        };
+        // SAFETY: the caller's pointer, as the header's preamble demands.
+        unsafe { put_struct(info, info_size, &value, "info") }
+    })
+}
+
+/// Force, impulse, displacement and touching particles of a plane of contact now.
+///
+/// - `contact`: index of the plane of contact.
+/// - `resultant`, `resultant_size`: receives them; the size of the struct.
+///
+/// Errors: `URLSPH_INVALID_ARGUMENT`, `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_get_contact_resultant(
+    simulation: *const urlsph_simulation,
+    contact: usize,
+    resultant: *mut urlsph_contact_resultant,
+    resultant_size: usize,
+) -> urlsph_status {
+    with(simulation, |session| {
+        at(&session.names.contacts, contact, "plane of contact")?;
+        let r = session.simulation()?.contact(contact);
+        let value = urlsph_contact_resultant {
+            force: r.force,
+            impulse: r.impulse,
+            displacement: r.displacement,
+            particles: r.particles,
         };
         // SAFETY: the caller's pointer, as the header's preamble demands.
         unsafe { put_struct(resultant, resultant_size, &value, "resultant") }

@@ -132,3 +132,47 @@ fn handles_are_never_used_again() {
         assert_eq!(urlsph_destroy(second), urlsph_status::URLSPH_OK);
     }
 }
+
+/// What the interface tells about contact is what the library itself has, to the bit.
+#[test]
+fn contact_is_that_of_the_library() {
+    let json = CString::new(include_str!("../../ffi-tests/contact.json")).expect("no NUL in it");
+    let mut handle = ptr::null_mut();
+    let mut contact = usize::MAX;
+    let mut force = MaybeUninit::<urlsph_contact_resultant>::uninit();
+    let mut counts = MaybeUninit::<urlsph_counts>::uninit();
+    // SAFETY: valid pointers with their sizes; the structs are written when the calls succeed.
+    let (counts, r) = unsafe {
+        let no_error = ptr::null_mut();
+        let json = json.as_ptr();
+        let status = urlsph_create_from_json(json, ptr::null(), 0, &mut handle, no_error, 0);
+        assert_eq!(status, urlsph_status::URLSPH_OK);
+        assert_eq!(urlsph_step(handle, 4e-3), urlsph_status::URLSPH_OK);
+        let size = size_of::<urlsph_counts>();
+        let status = urlsph_get_counts(handle, counts.as_mut_ptr(), size);
+        assert_eq!(status, urlsph_status::URLSPH_OK);
+        let status = urlsph_find_contact(handle, c"piston".as_ptr(), &mut contact);
+        assert_eq!(status, urlsph_status::URLSPH_OK);
+        let size = size_of::<urlsph_contact_resultant>();
+        let status = urlsph_get_contact_resultant(handle, contact, force.as_mut_ptr(), size);
+        assert_eq!(status, urlsph_status::URLSPH_OK);
+        (counts.assume_init(), force.assume_init())
+    };
+    let status = with(handle, |session| {
+        let simulation = session.simulation()?;
+        let names: Vec<&str> = simulation.contact_names().collect();
+        assert_eq!(names, ["floor", "piston"]);
+        assert_eq!((counts.contacts, contact), (2, 1));
+        let direct = simulation.contact(contact);
+        assert_eq!((r.force, r.impulse), (direct.force, direct.impulse));
+        assert_eq!(
+            (r.displacement, r.particles),
+            (direct.displacement, direct.particles)
+        );
+        assert!(r.force[1] < 0.0 && r.particles == 9);
+        Ok(())
+    });
+    assert_eq!(status, urlsph_status::URLSPH_OK, "{:?}", last_error(handle));
+    // SAFETY: handles may be anything.
+    assert_eq!(unsafe { urlsph_destroy(handle) }, urlsph_status::URLSPH_OK);
+}

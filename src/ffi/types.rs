@@ -212,6 +212,8 @@ pub struct urlsph_counts {
     pub threads: usize,
     /// Time steps since time 0.
     pub steps: u64,
+    /// Planes of contact.
+    pub contacts: usize,
 }
 
 /// A patch: a named set of boundary particles.
@@ -368,6 +370,32 @@ pub struct urlsph_heat_resultant {
     pub maximum_temperature: f64,
 }
 
+/// A plane of contact: rigid and frictionless.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct urlsph_contact_info {
+    /// Name; valid until the simulation is destroyed.
+    pub name: *const c_char,
+    /// A point of the plane at time 0 [m].
+    pub point: [f64; 3],
+    /// Unit normal, towards the body.
+    pub normal: [f64; 3],
+}
+
+/// What a plane of contact does to the body.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct urlsph_contact_resultant {
+    /// Force of the plane on the body [N], without the impulses of impacts.
+    pub force: [f64; 3],
+    /// Impulse of the plane on the body since time 0 [N s], with those of impacts.
+    pub impulse: [f64; 3],
+    /// How far the plane has moved along its normal since time 0 [m].
+    pub displacement: f64,
+    /// Number of particles that touch the plane.
+    pub particles: usize,
+}
+
 /// Motion of a probe and its temperature, interpolated between the particles around it.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
@@ -410,5 +438,7 @@ versioned! {
     urlsph_momenta.angular;
     urlsph_resultant.mean_velocity;
     urlsph_heat_resultant.maximum_temperature;
+    urlsph_contact_info.normal;
+    urlsph_contact_resultant.particles;
     urlsph_probe_motion.velocity;
 }

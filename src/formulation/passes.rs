@@ -4,7 +4,7 @@ use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
 use super::url::{Breakdown, Scratch, State, Trouble};
 use crate::lane::{Lane, PerSlot, SLICE, Work};
-use crate::layout::Array;
+use crate::layout::{Array, Layout};
 use crate::material::Deformation;
 use crate::math::*;
 use crate::reference::{PairVectors, Reference, load3, load9, store3, store9};
@@ -131,18 +131,30 @@ pub(super) struct Points<'a, 'o> {
     pub kinematics: Kinematics<'a>,
     pub reference: &'a Reference,
     pub v: [&'a [f64]; 3],
+    /// Spacing tensors ([`spacings`]), where they bound the step.
+    pub spacing: Option<[&'a [f64]; 6]>,
     pub slab: usize,
     pub out: &'o mut PointOutput<'a>,
 }
 
+/// What the point pass sums over a slab.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    /// Kinetic energy [J].
+    pub kinetic: f64,
+    /// Smallest square of a length that bounds the step [m^2].
+    pub length2: f64,
+}
+
 impl Work for Points<'_, '_> {
-    type Output = std::result::Result<f64, Breakdown>;
+    type Output = std::result::Result<Motion, Breakdown>;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> Self::Output {
         let Self {
             kinematics,
             reference,
             v,
+            spacing,
             slab,
             out,
             ..
@@ -151,6 +163,7 @@ impl Work for Points<'_, '_> {
         let density = T::splat(token, self.density);
         let half = T::splat(token, 0.5);
         let mut kinetic = PerSlot::new(0.0);
+        let mut shortest = PerSlot::new(f64::INFINITY);
         let mut admissible = PerSlot::new(1.0);
         let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
         let infinity = T::splat(token, f64::INFINITY);
@@ -188,14 +201,68 @@ impl Work for Points<'_, '_> {
             kinetic.add(at, motion);
             // Infinity - infinity is NaN.
             admissible.min(at, (infinity - motion).if_positive(one, zero));
+
+            if let Some(spacing) = &spacing {
+                let n = std::array::from_fn(|c| T::load(token, spacing[c], a));
+                let stretch = T::load(token, out.wave[0], at);
+                let length2 = bounded_length2(&kinematics.total(token, a).f, &n, stretch);
+                shortest.min(at, v_r.if_positive(length2, infinity));
+            }
         }
         if admissible.least() < 1.0 {
             return Err(first_breakdown(reference, slab, |slot| {
                 immovable(load3((), &v, slot), self.density * volume[slot])
             }));
         }
-        Ok(kinetic.sum())
+        Ok(Motion {
+            kinetic: kinetic.sum(),
+            length2: shortest.least(),
+        })
     }
+}
+
+/// Margin of the length that follows from a particle's own deformation over the shortest distance to
+/// its neighbours, at rest: bars that are stable by their distances alone do not meet it, and one that
+/// is not has become unstable at about 2.3.
+const SPACING_MARGIN: f64 = 1.6;
+
+/// Square of the length over which the gradient of a particle varies, as deformed by F, times the
+/// stretch that divides the wave speed [m^2]: 1/n is the largest eigenvalue of F^-T N F^-1.
+///
+/// A gradient, and the force that belongs to it, know F and no distances. Where the two part, as in a
+/// layer that a plane flattens, the shortest distance says nothing of how stiff the gradient is.
+#[inline(always)]
+fn bounded_length2<T: Lane>(f: &Mat3<T>, n: &Sym3<T>, stretch: T) -> T {
+    let cof = cofactor(f);
+    let j = dot(f[0], cof[0]);
+    let margin = T::splat(j.token(), SPACING_MARGIN) * stretch * j;
+    margin * margin / largest_eigenvalue(&full(&congruence(&cof, n)))
+}
+
+/// Spacing tensors N [m^-2] of the initial configuration: the sum of G (x) G over the corrected kernel
+/// gradients of a particle, scaled so that its largest eigenvalue is that of the shortest distance
+/// to a neighbour.
+pub(super) fn spacings(reference: &Reference) -> Array<6> {
+    let mut spacings = Array::new(reference.layout, [0.0; 6]);
+    let (x, l) = (&reference.x_initial, &reference.l);
+    let weights = reference.slices.weights();
+    for a in (0..reference.layout.particles).map(Layout::slot) {
+        let correction = matrix(&l.get(a));
+        let mut sum = [[0.0; 3]; 3];
+        let mut shortest = f64::INFINITY;
+        for (b, pair) in reference.slices.of(a) {
+            if weights[pair] > 0.0 {
+                let r = sub3(x.get(b), x.get(a));
+                let g = mat_vec(&correction, scale3(weights[pair], r));
+                sum = add_outer(&sum, g, g);
+                shortest = shortest.min(dot(r, r));
+            }
+        }
+        let scale = 1.0 / (largest_eigenvalue(&sum) * shortest);
+        let n = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+        spacings.set(a, n.map(|(r, c)| scale * sum[r][c]));
+    }
+    spacings
 }
 
 /// The first particle of a slab that is in trouble.
@@ -394,6 +461,8 @@ pub(super) struct Forces<'a, P, const MODE: u8> {
     pub speeds: WaveSpeeds<f64>,
     /// Share of the dissipation in resolved flow.
     pub coefficient: f64,
+    /// What makes up for that share in a shock, 0 without a limiter of shocks.
+    pub shock: f64,
     /// rho_R [kg/m^3].
     pub density: f64,
     pub slab: usize,
@@ -409,6 +478,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             input,
             speeds,
             coefficient,
+            shock,
             density,
             slab,
             mut out,
@@ -419,7 +489,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             pressure: T::splat(token, coefficient * speeds.pressure),
             shear: T::splat(token, coefficient * speeds.shear),
         };
-        let full = T::splat(token, 1.0 / coefficient);
+        let full = T::splat(token, shock);
         let far = T::splat(token, f64::INFINITY);
         let (mut power, mut shortest) = (PerSlot::new(0.0), PerSlot::new(f64::INFINITY));
         for (at, a) in lanes_of::<T>(input.reference, slab) {
@@ -456,7 +526,10 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                         [zero3(token); 3]
                     };
                     let jump = riemann::jump::<T, MODE>(&p, &grad_a, &grad_b, full);
-                    let d = riemann::dissipation(&p, jump, speeds);
+                    let mut d = riemann::dissipation(&p, jump, speeds);
+                    if MODE == riemann::GUARDED {
+                        d = riemann::guarded(d, p.dv);
+                    }
                     work = work + dot(d, p.dv);
                     f = add3(f, d);
                 }

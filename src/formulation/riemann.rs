@@ -18,10 +18,12 @@ pub const MINMOD: u8 = 2;
 pub const SHOCK: u8 = 3;
 /// No dissipation at all.
 pub const OFF: u8 = 4;
+/// As linear or shock, without the pairs that would gain energy.
+pub const GUARDED: u8 = 5;
 
 /// Whether the reconstruction needs gradients.
 pub const fn reconstructs(mode: u8) -> bool {
-    matches!(mode, LINEAR | MINMOD | SHOCK)
+    matches!(mode, LINEAR | MINMOD | SHOCK | GUARDED)
 }
 
 /// Wave speeds of the linearised law [m/s].
@@ -62,7 +64,7 @@ pub fn jump<T: Lane, const MODE: u8>(
     let Pair { dx, dv, dx2, .. } = *pair;
     match MODE {
         CONSTANT => dv,
-        SHOCK => limiter::shock_jump(dv, dx, dx2, &add9(grad_a, grad_b), full),
+        SHOCK | GUARDED => limiter::shock_jump(dv, dx, dx2, &add9(grad_a, grad_b), full),
         _ => {
             let (half_a, half_b) = (mat_vec(grad_a, dx), mat_vec(grad_b, dx));
             match MODE {
@@ -85,6 +87,13 @@ pub fn dissipation<T: Lane>(pair: &Pair<T>, jump: Vec3<T>, speeds: WaveSpeeds<T>
         inverse,
         axpy3(scale3(speeds.shear * pair.dx2, jump), along, pair.dx),
     )
+}
+
+/// D_ab of a pair that loses energy by it, else nothing.
+#[inline(always)]
+pub fn guarded<T: Lane>(d: Vec3<T>, dv: Vec3<T>) -> Vec3<T> {
+    let (work, none) = (dot(d, dv), d[0].of(0.0));
+    d.map(|d| work.if_positive(d, none))
 }
 
 /// D^j_ab with a coefficient, for the rate of the volume V_chi dj/dt ([URL22] 59, 60): spatial like

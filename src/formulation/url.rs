@@ -13,8 +13,8 @@ use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
 use super::laws::{LawInputs, Stored, inadmissible, stresses};
 use super::passes::{
-    Bound, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, PointOutput, Points,
-    VolumeRates, immovable,
+    Bound, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, Motion, PointOutput, Points,
+    VolumeRates, immovable, spacings,
 };
 use super::riemann::{self, WaveSpeeds};
 use crate::lane::{Lane, SLICE, Work, vectorised};
@@ -107,6 +107,9 @@ pub struct Breakdown {
     pub trouble: Trouble,
 }
 
+/// Share of the kinetic energy that round-off may make of D^p while a wave runs to a neighbour.
+const ROUND_OFF: f64 = 1e-12;
+
 /// What a solution breaks down of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Trouble {
@@ -116,6 +119,18 @@ pub enum Trouble {
     Temperature(f64),
     /// A velocity is not finite.
     Velocity,
+}
+
+/// The particle that bounds the step.
+#[derive(Debug, Clone, Copy)]
+pub struct Narrowest {
+    /// Its slot.
+    pub slot: usize,
+    /// Smallest stretch of its F.
+    pub stretch: f64,
+    /// The neighbour that is nearer than that stretch: its slot, their distance over the first one, and
+    /// the same by the F of both.
+    pub pair: Option<(usize, f64, f64)>,
 }
 
 /// What the scene asks of the formulation, resolved to what the loops branch on.
@@ -136,6 +151,9 @@ pub struct Url {
     pub(super) options: Options,
     pub(super) scratch: Scratch,
     conduction: Option<Conduction>,
+    /// Spacing tensors [m^-2], initial; only of a law that flows, with kernels on a lattice. Elsewhere
+    /// the stretch of the law or the areas of the pairs see to the same.
+    spacing: Option<Array<6>>,
     /// Rates of the last evaluation.
     pub rates: Rates,
 }
@@ -236,6 +254,7 @@ impl Url {
                 theta: thermal.map(|_| Array::new(layout, [1.0; 2])),
             },
             conduction: conduction.map(|thermal| Conduction::new(layout, thermal)),
+            spacing: (law.has_history() && !bound).then(|| spacings(reference)),
             rates: Rates {
                 force: Array::new(layout, [0.0; 3]),
                 grad_v: Array::new(layout, [0.0; 9]),
@@ -303,11 +322,12 @@ impl Url {
             ..Evaluation::default()
         };
         for point in self.points::<R>(state, reference, elapsed) {
-            let (stored, kinetic) = point?;
+            let (stored, motion) = point?;
+            total.length = total.length.min(motion.length2);
             total.strain += stored.strain;
             total.thermal += stored.thermal;
             total.entropy += stored.entropy;
-            total.kinetic += kinetic;
+            total.kinetic += motion.kinetic;
         }
         if self.options.venkatakrishnan
             && let Some(half_grad) = &mut self.scratch.half_grad
@@ -324,11 +344,21 @@ impl Url {
             });
         }
         self.bound::<R>(state, reference);
-        for (dissipation, length2) in self.forces::<R>(state, reference) {
+        let mode = self.options.mode;
+        for (dissipation, length2) in self.forces::<R>(state, reference, mode) {
             total.dissipation += dissipation;
             total.length = total.length.min(length2);
         }
         total.length = total.length.sqrt();
+        // The linear reconstruction of a pair may pass the jump, and such a pair gains a little of what
+        // the others lose. Where all of them together gain, flow varies beyond what gradients
+        // can follow: then nothing is left to those that gain.
+        let gain = -total.dissipation * total.length;
+        let round_off = ROUND_OFF * total.kinetic * self.wave_speeds().pressure;
+        if matches!(mode, riemann::LINEAR | riemann::SHOCK) && gain > round_off {
+            let guarded = self.forces::<R>(state, reference, riemann::GUARDED);
+            total.dissipation = guarded.iter().map(|(dissipation, _)| dissipation).sum();
+        }
         if self.scratch.sigma_j.is_some() {
             total.dissipation += self.volume_rates::<R>(state, reference);
         }
@@ -346,20 +376,22 @@ impl Url {
         Ok(total)
     }
 
-    /// Gradient, law and point passes; what is stored, and the kinetic energy, by slab.
+    /// Gradient, law and point passes; what is stored and how it moves, by slab.
     fn points<R: Runner>(
         &mut self,
         state: &State,
         reference: &Reference,
         elapsed: Option<f64>,
-    ) -> Vec<std::result::Result<(Stored, f64), Breakdown>> {
+    ) -> Vec<std::result::Result<(Stored, Motion), Breakdown>> {
         let Self {
             law,
             options,
             scratch,
             rates,
+            spacing,
             ..
         } = self;
+        let spacing = spacing.as_ref().map(Array::components);
         let v = state.v.components();
         let kinematics = Kinematics::new(state, reference);
         let density = law.density();
@@ -403,15 +435,16 @@ impl Url {
             let stored = with_law!(law, law => {
                 stresses::<R, _>(law, inputs, elapsed.is_some(), slab, &mut out)
             })?;
-            let kinetic = R::run(Points {
+            let motion = R::run(Points {
                 density,
                 kinematics,
                 reference,
                 v,
+                spacing,
                 slab,
                 out: &mut out,
             })?;
-            Ok((stored, kinetic))
+            Ok((stored, motion))
         })
     }
 
@@ -438,7 +471,12 @@ impl Url {
     }
 
     /// Force pass; power of the dissipation and squared length by slab.
-    fn forces<R: Runner>(&mut self, state: &State, reference: &Reference) -> Vec<(f64, f64)> {
+    fn forces<R: Runner>(
+        &mut self,
+        state: &State,
+        reference: &Reference,
+        mode: u8,
+    ) -> Vec<(f64, f64)> {
         let (speeds, density) = (self.wave_speeds(), self.law.density());
         let Self {
             options,
@@ -447,19 +485,25 @@ impl Url {
             ..
         } = self;
         let coefficient = options.coefficient;
+        let shock = match options.mode {
+            riemann::SHOCK => 1.0 / coefficient,
+            _ => 0.0,
+        };
         let input = ForceInput::new(state, reference, scratch);
         parallel::map_slabs(rates.force.slabs_mut(), |slab, out| {
             macro_rules! forces {
                 ($pairs:expr, $($mode:ident),*) => {
-                    match options.mode {
+                    match mode {
                         $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
-                            pairs: $pairs, input, speeds, coefficient, density, slab, out,
+                            pairs: $pairs, input, speeds, coefficient, shock, density, slab, out,
                         }),)*
-                        _ => unreachable!("five modes"),
+                        _ => unreachable!("six modes"),
                     }
                 };
             }
-            with_pairs!(reference, pairs => forces!(pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF))
+            with_pairs!(reference, pairs => forces!(
+                pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF, GUARDED
+            ))
         })
     }
 
@@ -622,6 +666,55 @@ impl Url {
         Ok(())
     }
 
+    /// What bounds the step of the last evaluation.
+    #[cold]
+    pub fn narrowest(&self, state: &State, reference: &Reference) -> Narrowest {
+        let kinematics = Kinematics::new(state, reference);
+        let stretch = |slot| {
+            let f = kinematics.total::<f64>((), slot).f;
+            let cof = cofactor(&f);
+            dot(f[0], cof[0]) / largest_eigenvalue(&mat_mul_t(&cof, &cof)).sqrt()
+        };
+        let weights = reference.slices.weights();
+        let (mut shortest, mut closest) = (f64::INFINITY, None);
+        let (mut least, mut thinnest) = (f64::INFINITY, Layout::FIRST);
+        for a in (0..reference.layout.particles).map(Layout::slot) {
+            let own = stretch(a);
+            if own < least {
+                (least, thinnest) = (own, a);
+            }
+            for (b, pair) in reference.slices.of(a) {
+                let wave = |slot| self.scratch.wave.get(slot)[0];
+                let dx = sub3(state.x.get(b), state.x.get(a));
+                let length = dot(dx, dx).sqrt() * 0.5 * (wave(a) + wave(b));
+                if weights[pair] > 0.0 && length < shortest {
+                    (shortest, closest) = (length, Some((a, b)));
+                }
+            }
+        }
+        let pair = closest.map(|(a, b)| {
+            let r = sub3(reference.x_initial.get(b), reference.x_initial.get(a));
+            let dx = sub3(state.x.get(b), state.x.get(a));
+            let length = |v: Vec3<f64>| dot(v, v).sqrt();
+            let deformed = |slot| length(mat_vec(&kinematics.total::<f64>((), slot).f, r));
+            let first = length(r);
+            let mean = 0.5 * (deformed(a) + deformed(b));
+            (a, b, length(dx) / first, mean / first)
+        });
+        match pair {
+            Some((slot, other, closer, deformed)) if closer < least => Narrowest {
+                slot,
+                stretch: stretch(slot),
+                pair: Some((other, closer, deformed)),
+            },
+            _ => Narrowest {
+                slot: thinnest,
+                stretch: least,
+                pair: None,
+            },
+        }
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let s = &self.scratch;
@@ -636,6 +729,7 @@ impl Url {
             + s.theta.as_ref().map_or(0, Array::bytes)
             + self.rates.heat.as_ref().map_or(0, Array::bytes)
             + self.conduction.as_ref().map_or(0, Conduction::bytes)
+            + self.spacing.as_ref().map_or(0, Array::bytes)
     }
 }
 

@@ -44,6 +44,10 @@ impl MeshFile {
     pub fn nodes(&self) -> usize {
         self.nodes.len()
     }
+    /// Whether all cells are hexahedra.
+    pub fn all_hexahedra(&self) -> bool {
+        self.cells.iter().all(|c| c.kind == CellKind::Hexahedron)
+    }
     /// Names of the physical surfaces, as the names of patches; `surface` where there are none.
     pub fn names(&self) -> &[String] {
         &self.names

@@ -155,7 +155,7 @@ impl Reference {
     /// plane, or where the operators cannot be repaired.
     pub fn new(particles: &Particles, graph: &Graph, numerics: &Numerics) -> Result<Self> {
         let layout = Layout::new(particles.count());
-        let operators = operators(particles, numerics);
+        let operators = numerics.operators_on(matches!(particles.shape, Shape::Lattice(_)));
         let volumes = match operators {
             Operators::Repaired => evened_out(particles, graph),
             _ => particles.volumes.clone(),
@@ -597,15 +597,6 @@ impl Reference {
             + closed
             + self.stored.as_ref().map_or(0, StoredVectors::bytes)
     }
-}
-
-/// The operators of a body: the scene's choice, or the kernel's where particles form a lattice, on
-/// which they close, and where weights are as printed; repaired ones elsewhere.
-fn operators(particles: &Particles, numerics: &Numerics) -> Operators {
-    numerics.operators.unwrap_or(match particles.shape {
-        Shape::Mesh(_) if numerics.weights == Weights::Unit => Operators::Repaired,
-        _ => Operators::Kernel,
-    })
 }
 
 /// Evens out the volumes over the solid angles that they fill, by exchange between neighbours: small

@@ -833,7 +833,7 @@ mod tests {
                  {complete:.1e} (1e-14), {report:?}"
             );
             assert!(closure < 1e-10 && complete < 1e-14);
-            assert!(report.before > 0.01 && report.after < 1e-11 && report.size < 0.2);
+            assert!(report.before > 5e-3 && report.after < 1e-11 && report.size < 0.2);
         }
     }
 

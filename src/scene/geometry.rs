@@ -11,16 +11,19 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::{Deserialize, Deserializer, Serialize, de};
 use xxhash_rust::xxh3::xxh3_64;
 
+use super::Scene;
 use super::numerics::Neighbours;
 use super::validate::{ROUND_OFF, finite, key, listed, positive, require, valid_name};
 use super::value;
 use crate::error::{Code, Error, Result};
 use crate::particles::MeshFile;
+use crate::plan::bytes_per_particle;
 
-/// Memory of a simulation per particle [bytes], with 18 neighbours.
-const BYTES_PER_PARTICLE: f64 = 1300.0;
-/// What a pair beyond the usual ones takes while the lists are built [bytes].
-const BYTES_PER_PAIR: f64 = 24.0;
+/// What a particle takes beside [`bytes_per_particle`] while a body is set up [bytes], on a lattice and
+/// elsewhere; measured.
+const SETUP_BYTES_PER_PARTICLE: (f64, f64) = (100.0, 420.0);
+/// What a pair takes while the lists are built [bytes].
+const SETUP_BYTES_PER_PAIR: f64 = 4.0;
 /// Particles are numbered in 32 bits, with room for flags.
 const MAX_PARTICLES: f64 = (1u64 << 31) as f64;
 
@@ -546,6 +549,15 @@ impl Geometry {
         }
     }
 
+    /// Whether the particles form a lattice; otherwise they are the nodes of a mesh.
+    pub(crate) fn is_lattice(&self) -> bool {
+        match self {
+            Geometry::Box(b) => b.is_lattice(),
+            Geometry::Boxes(_) => true,
+            _ => false,
+        }
+    }
+
     /// Names of the faces: each is a patch.
     pub fn faces(&self) -> Vec<String> {
         let all = || (0..3).flat_map(axis_faces);
@@ -566,6 +578,14 @@ impl Geometry {
         match self {
             Geometry::Mesh(mesh) => mesh.pack().map(|file| vec![file]),
             _ => Ok(Vec::new()),
+        }
+    }
+
+    /// Takes over what the same geometry has read from its files.
+    #[cfg(feature = "fmi")]
+    pub(super) fn adopt(&mut self, read: &Self) {
+        if let (Geometry::Mesh(_), Geometry::Mesh(_)) = (&*self, read) {
+            self.clone_from(read);
         }
     }
 
@@ -865,61 +885,70 @@ pub(super) fn selection(path: &str, patch: &PatchSelection, faces: &[String]) ->
     Ok(())
 }
 
-/// Whether the particles fit into their numbers and into the memory [bytes], if that is known.
-pub(super) fn capacity(
-    geometry: &Geometry,
-    neighbours: Neighbours,
-    memory: Option<f64>,
-) -> Result<()> {
-    // In f64, as a tiny spacing overflows any integer.
-    let pairs_within = |count: f64, h: [f64; 3]| match neighbours {
-        Neighbours::Lattice(_) => 0.0,
+/// By part of the body: the number of particles, the length of the list of neighbours of one inside, and
+/// the path in the scene that says so. In f64, as a tiny spacing overflows any integer.
+fn sizes(geometry: &Geometry, neighbours: Neighbours) -> Result<Vec<(f64, f64, String)>> {
+    let pairs = |count: f64, h: [f64; 3]| match neighbours {
+        Neighbours::Lattice(number) => f64::from(number),
         Neighbours::Radius { radius } => {
             // Cells of a ball around a particle, as far as the body reaches.
-            let reach = (radius + 1.0) * h.into_iter().fold(0.0, f64::max);
+            let reach = (radius + 0.2) * h.into_iter().fold(0.0, f64::max);
             let ball = 4.19 * reach.powi(3) / (h[0] * h[1] * h[2]);
-            count * ball.min(count)
+            ball.min(count)
         }
     };
-    let counts: Vec<(f64, f64, String)> = match geometry {
+    let whole = |count: f64, place: &str| vec![(count, pairs(count, [1.0; 3]), place.to_owned())];
+    Ok(match geometry {
         Geometry::Box(_) | Geometry::Boxes(_) => geometry
             .boxes()
             .into_iter()
             .map(|(name, b)| {
                 let count: f64 = (0..3).map(|a| b.cells(a) + 1.0).product();
-                let pairs = pairs_within(count, b.spacing.per_axis());
+                let pairs = pairs(count, b.spacing.per_axis());
                 (count, pairs, format!("{}.spacing", box_path(name)))
             })
             .collect(),
-        Geometry::Cylinder(c) => {
-            let count = c.particles();
-            vec![(
-                count,
-                pairs_within(count, [1.0; 3]),
-                "geometry.cylinder".into(),
-            )]
-        }
-        Geometry::PerforatedBox(b) => {
-            let count = b.particles();
-            vec![(
-                count,
-                pairs_within(count, [1.0; 3]),
-                "geometry.perforated_box".into(),
-            )]
-        }
+        Geometry::Cylinder(c) => whole(c.particles(), "geometry.cylinder"),
+        Geometry::PerforatedBox(b) => whole(b.particles(), "geometry.perforated_box"),
         Geometry::Mesh(mesh) => {
-            let count = mesh.content()?.nodes() as f64;
-            vec![(
-                count,
-                pairs_within(count, [1.0; 3]),
-                "geometry.mesh.file".into(),
-            )]
+            let content = mesh.content()?;
+            let count = content.nodes() as f64;
+            let own = match neighbours {
+                // The edges of tetrahedra are as many whatever is asked for.
+                Neighbours::Lattice(_) if !content.all_hexahedra() => 18.0,
+                _ => pairs(count, [1.0; 3]),
+            };
+            // A list has a place for each lane of a vector, and the order of the nodes of a mesh leaves
+            // up to two thirds of them empty; measured.
+            let lanes = (3.0 * own).min(own.max(50.0));
+            vec![(count, lanes, "geometry.mesh.file".to_owned())]
         }
+    })
+}
+
+impl Scene {
+    /// Memory that a simulation of this scene holds [bytes], foreseen.
+    #[cfg(test)]
+    pub(crate) fn bytes(&self) -> Result<f64> {
+        let sizes = sizes(&self.geometry, self.numerics.neighbours)?;
+        let bytes = sizes
+            .iter()
+            .map(|(count, pairs, _)| count * bytes_per_particle(self, *pairs));
+        Ok(bytes.sum())
+    }
+}
+
+/// Whether the particles fit into their numbers and into the memory [bytes], if that is known.
+pub(super) fn capacity(scene: &Scene, memory: Option<f64>) -> Result<()> {
+    let setup = match scene.geometry.is_lattice() {
+        true => SETUP_BYTES_PER_PARTICLE.0,
+        false => SETUP_BYTES_PER_PARTICLE.1,
     };
     let (mut total, mut bytes, mut most) = (0.0, 0.0, (0.0, String::new()));
-    for (count, pairs, place) in counts {
+    for (count, pairs, place) in sizes(&scene.geometry, scene.numerics.neighbours)? {
         total += count;
-        bytes += count * BYTES_PER_PARTICLE + pairs * BYTES_PER_PAIR;
+        let held = bytes_per_particle(scene, pairs);
+        bytes += count * (held + setup + pairs * SETUP_BYTES_PER_PAIR);
         if count > most.0 {
             most = (count, place);
         }
@@ -965,22 +994,22 @@ mod tests {
 
     #[test]
     fn more_particles_than_memory_are_refused() {
-        let geometry = Geometry::Box(BoxGeometry {
-            min: [0.0; 3],
-            max: [1.0; 3],
-            spacing: Spacing::Uniform(0.1),
-            grading: None,
-            jitter: None,
-        });
-        let need = 1331.0 * BYTES_PER_PARTICLE;
-        capacity(&geometry, Neighbours::Lattice(18), None).unwrap();
-        capacity(&geometry, Neighbours::Lattice(18), Some(need)).unwrap();
-        let error = capacity(&geometry, Neighbours::Lattice(18), Some(need - 1.0)).unwrap_err();
-        let wide = Neighbours::Radius { radius: 1e9 };
-        capacity(&geometry, wide, Some(need)).unwrap_err();
+        let text = r#"{
+            "geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.1}},
+            "material": {"neo_hookean": {"density": 1, "youngs_modulus": 1, "poisson_ratio": 0}},
+            "boundary": {}, "time": {"end": 1}
+        }"#;
+        let mut scene = Scene::from_json(text, &[]).unwrap();
+        let pairs = 1331.0 * 18.0 * SETUP_BYTES_PER_PAIR;
+        let need = scene.bytes().unwrap() + 1331.0 * SETUP_BYTES_PER_PARTICLE.0 + pairs;
+        capacity(&scene, None).unwrap();
+        capacity(&scene, Some(need + 1.0)).unwrap();
+        let error = capacity(&scene, Some(need - 1.0)).unwrap_err();
         assert_eq!(error.code(), Code::OutOfMemory);
         assert_eq!(error.place().path.as_deref(), Some("geometry.box.spacing"));
         assert!(error.message().contains("1331 particles"), "{error}");
+        scene.numerics.neighbours = Neighbours::Radius { radius: 1e9 };
+        capacity(&scene, Some(need)).unwrap_err();
     }
 
     #[test]

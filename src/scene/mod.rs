@@ -140,6 +140,17 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The same scene with other overrides, and the files that this one has read: they may be gone.
+    #[cfg(feature = "fmi")]
+    pub(crate) fn again(&self, text: &str, overrides: &[String]) -> Result<Self> {
+        let mut scene = parse::parse(text, overrides)?;
+        scene.geometry.adopt(&self.geometry);
+        scene
+            .validate()
+            .map_err(|e| parse::with_override(e, overrides))?;
+        Ok(scene)
+    }
+
     /// Reads, parses and validates a scene file; see [`from_json`](Self::from_json). Files that the
     /// scene names are relative to its folder.
     ///

@@ -38,11 +38,7 @@ impl Scene {
         self.probes_inside()?;
         positive("time.end", self.time.end)?;
         output(&self.output)?;
-        geometry::capacity(
-            &self.geometry,
-            self.numerics.neighbours,
-            geometry::available_memory(),
-        )
+        geometry::capacity(self, geometry::available_memory())
     }
 
     fn patches_and_conditions(&self) -> Result<()> {

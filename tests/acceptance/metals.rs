@@ -1,7 +1,7 @@
 //! Metals: Taylor bars on a rigid plane and bars that neck, against references, closed forms and
 //! their own refinement; and what happens at the extremes.
 
-use urlsph::{Field, Scene, Simulation};
+use urlsph::{Code, Energies, Field, Scene, Simulation};
 
 use crate::support::*;
 
@@ -54,6 +54,8 @@ struct Impact {
     length: f64,
     /// Height of the rim above the plane [m].
     lift: f64,
+    /// Temperature of the probe `inside` [K], where there is one.
+    inside: Option<f64>,
 }
 
 impl Impact {
@@ -67,8 +69,19 @@ impl Impact {
             height,
             length: height - displacement(s, "foot")[2],
             lift: rim[2],
+            inside: (s.probe_names().iter().position(|n| n == "inside"))
+                .and_then(|probe| s.probe(probe).temperature),
         }
     }
+}
+
+/// Without D^j the roughness is 0.9 in the copper bar, 0.7 and 1.1 in the bars that neck.
+fn pressure_is_smooth(s: &Simulation, tolerance: f64) {
+    check(
+        &format!("{}: roughness of the pressure", s.scene().title),
+        Roughness::new(s).of(s),
+        tolerance,
+    );
 }
 
 /// A whole impact, step by step; energy is neither made nor lost beyond the error of the steps.
@@ -98,6 +111,7 @@ impl Run {
             e.closure_error.abs() / initial,
             3e-3,
         );
+        pressure_is_smooth(simulation, 0.25);
         Self {
             history,
             dissipated: [
@@ -247,25 +261,36 @@ fn copper_bar_in_full() {
     );
 }
 
-/// Temperature of the particle nearest to a place of the initial configuration [K].
-fn temperature_at(simulation: &Simulation, place: [f64; 3]) -> f64 {
-    let initial = field(simulation, Field::InitialPosition);
-    let distance = |x: &[f64]| norm(&[x[0] - place[0], x[1] - place[1], x[2] - place[2]]);
-    let nearest = initial
-        .chunks(3)
-        .enumerate()
-        .min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))
-        .expect("particles");
-    field(simulation, Field::Temperature)[nearest.0]
-}
-
-/// A point of the axis, a radius above the foot.
-const INSIDE: [f64; 3] = [0.0, 0.0, 0.0032];
+/// Times at which the temperature inside is printed [s].
+const TIMES: [f64; 6] = [5e-6, 1e-5, 2e-5, 3e-5, 5e-5, 8e-5];
 
 struct Hot {
     run: Run,
-    /// Temperature inside over time [K].
+    /// Temperature of the probe `inside`, a radius above the foot on the axis, over time [K].
     inside: Vec<(f64, f64)>,
+}
+
+impl Hot {
+    /// Temperature inside at a time, linear between the steps.
+    fn inside_at(&self, time: f64) -> f64 {
+        let next = self.inside.partition_point(|i| i.0 < time);
+        let [a, b] = [next.max(1) - 1, next.min(self.inside.len() - 1)].map(|i| self.inside[i]);
+        if a.0 == b.0 {
+            return b.1;
+        }
+        a.1 + (time - a.0) / (b.0 - a.0) * (b.1 - a.1)
+    }
+
+    /// Largest distance of the temperatures inside over the warming at the end.
+    fn distance(&self, other: &Self) -> f64 {
+        let distance = |(time, here): &(f64, f64)| (here - other.inside_at(*time)).abs();
+        let (start, end) = (self.inside[0].1, self.inside[self.inside.len() - 1].1);
+        self.inside.iter().map(distance).fold(0.0, f64::max) / (end - start)
+    }
+
+    fn warmed(&self) -> f64 {
+        self.inside[self.inside.len() - 1].1 - self.inside[0].1
+    }
 }
 
 /// A bar that starts free of stress at a temperature.
@@ -280,28 +305,31 @@ fn taylor(bar: Bar, temperature: f64) -> Hot {
             / 9e7,
         1e-6,
     );
-    let end = simulation.scene().time.end;
-    let mut inside = Vec::new();
     let run = Run::new(&mut simulation);
-    inside.push((end, temperature_at(&simulation, INSIDE)));
+    let inside = run.history.iter().filter_map(|i| Some((i.time, i.inside?)));
+    let hot = Hot {
+        inside: inside.collect(),
+        run,
+    };
     let hottest = field(&simulation, Field::Temperature)
         .into_iter()
         .fold(0.0, f64::max);
-    let last = run.end();
+    let last = hot.run.end();
+    let history = TIMES.map(|time| format!("{:.1}", hot.inside_at(time)));
     println!(
-        "| {temperature} | {} | {:.3} | {:.3} | {:.1} | {hottest:.0} | {:.4} | {:.4} |",
+        "| {temperature} | {} | {:.3} | {:.3} | {} | {hottest:.0} | {:.4} | {:.4} |",
         bar.particles,
         1e3 * last.radius,
         1e3 * last.length,
-        inside[0].1,
-        run.dissipated[0],
-        run.dissipated[1],
+        history.join(" | "),
+        hot.run.dissipated[0],
+        hot.run.dissipated[1],
     );
-    Hot { run, inside }
+    hot
 }
 
-const TAYLOR: &str = "| start [K] | particles | radius [mm] | length [mm] | 3.2 mm above the foot [K] | hottest [K] | D/E0 | contact/E0 |
-|---|---|---|---|---|---|---|---|";
+const TAYLOR: &str = "| start [K] | particles | radius [mm] | length [mm] | inside at 5 µs [K] | 10 µs | 20 µs | 30 µs | 50 µs | 80 µs | hottest [K] | D/E0 | contact/E0 |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|";
 
 #[test]
 fn hot_bar_spreads_further_than_a_cold_one() {
@@ -310,8 +338,8 @@ fn hot_bar_spreads_further_than_a_cold_one() {
     let (a, b) = (cold.1.run.end(), hot.1.run.end());
     check_at_least("radius, hot over cold", b.radius / a.radius, 1.1);
     check("length, hot over cold", b.length / a.length, 0.95);
-    for (start, bar) in [cold, hot] {
-        let warmed = bar.inside[0].1 - start;
+    for (_, bar) in [cold, hot] {
+        let warmed = bar.warmed();
         // All of the kinetic energy spread over half of the bar, and twice of that.
         let energy = 0.5 * 227.0_f64.powi(2) / 383.0;
         check_at_least("warming inside [K]", warmed, energy);
@@ -338,11 +366,16 @@ fn hot_bars_settle_with_refinement() {
             (length[2] / length[1] - 1.0).abs(),
             0.005,
         );
-        let inside = sizes.each_ref().map(|hot| hot.inside[0].1);
+        let inside = sizes.each_ref().map(|hot| hot.inside_at(80e-6));
         check(
             "temperature inside, 3721 to 7280",
             (inside[2] / inside[1] - 1.0).abs(),
             0.03,
+        );
+        check(
+            "temperature inside at all times, over the warming: 3721 to 7280",
+            sizes[2].distance(&sizes[1]),
+            0.15,
         );
     }
 }
@@ -435,6 +468,7 @@ impl Neck {
             e.numerical_dissipation / e.external_work,
             5e-3,
         );
+        pressure_is_smooth(&simulation, 0.15);
         for elongation in [4e-3, 8e-3, 10e-3, 12e-3, 13.99e-3] {
             let row = rows.iter().find(|r| r[0] >= elongation).expect("so long");
             println!(
@@ -551,35 +585,47 @@ fn stretched_hot_bar_stays_smooth() {
         e.numerical_dissipation / initial
     );
     check("ledger over E0", e.closure_error.abs() / initial, 3e-3);
+    // Of a neck that four layers of particles make up.
+    pressure_is_smooth(&simulation, 0.5);
     check("radius ratio", ratio, 0.35);
     check_at_least("elongation [mm]", 1e3 * top, 14.0);
     check_at_least("smallest J", smallest, 0.8);
 }
 
 /// A cube that is pressed together between plates to J = 0.2 while its sides cannot give way.
-fn pressed(material: &str) -> Scene {
+fn pressed(material: &str, neighbours: u8) -> Scene {
     let text = format!(
         r#"{{"geometry": {{"box": {{"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.125}}}},
         "material": {{{material}}},
         "boundary": {{"x_min": {{"support": "roller"}}, "x_max": {{"support": "roller"}},
             "y_min": {{"support": "roller"}}, "y_max": {{"support": "roller"}},
             "z_min": {{"support": "roller"}}, "z_max": {{"velocity": [null, null, -8]}}}},
+        "numerics": {{"neighbours": {neighbours}}},
         "time": {{"end": 0.1}}}}"#
     );
     Scene::from_json(&text, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Runs to the end or stops with an error; a line of the table tells which.
-fn extreme(what: &str, scene: Scene) -> Result<Simulation, urlsph::Error> {
+/// Runs to the end or stops with an error; a line of the table tells which. The scheme never gives
+/// energy, and the ledger stays closed in either case.
+fn extreme(what: &str, scene: Scene, ledger: f64) -> Result<Simulation, urlsph::Error> {
     let end = scene.time.end;
     let mut simulation = Simulation::with_threads(scene, 1)?;
     let start = simulation.energies();
-    let result = simulation.advance(end);
+    let supplied = |e: &Energies| start.kinetic + start.strain + e.external_work;
+    let (mut before, mut gain) = (0.0, f64::NEG_INFINITY);
+    let mut result = Ok(());
+    while result.is_ok() && simulation.time() < end {
+        let next = simulation.time() + simulation.stable_step() * (1.0 - 1e-9);
+        result = simulation.advance(next.min(end));
+        let e = simulation.energies();
+        gain = gain.max((before - e.numerical_dissipation) / supplied(&e).max(e.kinetic));
+        before = e.numerical_dissipation;
+    }
     let (e, j) = (simulation.energies(), field(&simulation, Field::Jacobian));
     let (least, most) = j
         .iter()
         .fold((f64::INFINITY, 0.0_f64), |m, j| (m.0.min(*j), m.1.max(*j)));
-    let supplied = start.kinetic + start.strain + e.external_work;
     println!(
         "| {what} | {} | {} | {least:.3} to {most:.3} | {:.4} | {:+.1e} |",
         match &result {
@@ -587,10 +633,33 @@ fn extreme(what: &str, scene: Scene) -> Result<Simulation, urlsph::Error> {
             Err(error) => format!("stops at {:.3e} s: {error}", simulation.time()),
         },
         simulation.steps(),
-        e.numerical_dissipation / supplied,
-        e.closure_error / supplied,
+        e.numerical_dissipation / supplied(&e),
+        e.closure_error / supplied(&e),
+    );
+    check(
+        &format!("{what}: energy that the dissipation gave in a step"),
+        gain,
+        1e-11,
+    );
+    check(
+        &format!("{what}: ledger over the supplied energy"),
+        (e.closure_error / supplied(&e)).abs(),
+        ledger,
     );
     result.map(|()| simulation)
+}
+
+/// Next to melting a bar flows like a fluid: its foot is thinner in F than in the distances of its
+/// particles, which alone let the step be too large (from 26 us on), and the linear reconstruction on
+/// its own gains energy (from 19 us on).
+#[test]
+fn bar_next_to_melting_gains_no_energy() {
+    let near_melt = scene(
+        "taylor_johnson_cook",
+        &["heat.reference_temperature=1340", "time.end=2.8e-5"],
+    );
+    let what = "Taylor bar at 1340 K to 28 us";
+    extreme(what, near_melt, 3e-3).unwrap_or_else(|e| panic!("{what}: {e}"));
 }
 
 #[test]
@@ -614,32 +683,68 @@ fn extremes_run_or_say_why_not() {
         scene("column_twisting", &overrides)
     };
     let near_melt = scene("taylor_johnson_cook", &["heat.reference_temperature=1340"]);
-    let elastic = pressed(
-        r#""neo_hookean": {"density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3}"#,
-    );
-    let metal = pressed(
-        r#""von_mises": {"density": 8930, "youngs_modulus": 1.17e11, "poisson_ratio": 0.35, "yield_stress": 4e8, "hardening_modulus": 1e8}"#,
-    );
-    for (what, scene) in [
-        ("Taylor bar at 400 m/s, dissipation 1", fast(&share("1"))),
+    let elastic =
+        r#""neo_hookean": {"density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3}"#;
+    let metal = r#""von_mises": {"density": 8930, "youngs_modulus": 1.17e11, "poisson_ratio": 0.35, "yield_stress": 4e8, "hardening_modulus": 1e8}"#;
+    // What the integrator takes of the shortest waves of an impact, and of those of a start that does
+    // not fit the supports (twisting), is the error of the ledger: third order in the step.
+    for (what, scene, ledger, runs) in [
+        (
+            "Taylor bar at 400 m/s, dissipation 1",
+            fast(&share("1")),
+            3e-3,
+            true,
+        ),
         (
             "Taylor bar at 400 m/s, dissipation 0.3",
             fast(&share("0.3")),
+            3e-3,
+            false,
         ),
-        ("twisting at 330 rad/s, ν = 0.49", twist(330)),
-        ("twisting at 480 rad/s, ν = 0.49", twist(480)),
-        ("Taylor bar at 1340 K, 16 K below melting", near_melt),
-        ("neo-Hookean cube pressed to J = 0.2", elastic),
-        ("copper cube pressed to J = 0.2", metal),
+        ("twisting at 330 rad/s, ν = 0.49", twist(330), 3e-2, true),
+        ("twisting at 480 rad/s, ν = 0.49", twist(480), 3e-2, true),
+        (
+            "Taylor bar at 1340 K, 16 K below melting",
+            near_melt,
+            3e-3,
+            true,
+        ),
+        (
+            "neo-Hookean cube pressed to J = 0.2",
+            pressed(elastic, 18),
+            1e-4,
+            true,
+        ),
+        (
+            "copper cube pressed to J = 0.2",
+            pressed(metal, 18),
+            1e-4,
+            false,
+        ),
+        (
+            "copper cube pressed to J = 0.2, 6 neighbours",
+            pressed(metal, 6),
+            1e-4,
+            true,
+        ),
     ] {
-        match extreme(what, scene) {
+        match extreme(what, scene, ledger) {
             Ok(simulation) => {
+                assert!(runs, "{what}: runs, which is more than is promised");
                 let finite = field(&simulation, Field::Position)
                     .iter()
                     .all(|x| x.is_finite());
                 assert!(finite, "{what}: a run that ends has a finite state");
             }
-            Err(error) => assert!(!error.to_string().is_empty(), "{what}"),
+            Err(error) => {
+                assert!(!runs, "{what}: {error}");
+                assert_eq!(error.code(), Code::Diverged, "{what}: {error}");
+                let place = error.place();
+                assert!(place.particle.is_some() && place.time.is_some(), "{error}");
+                for word in ["have come together", "numerics.", "refine the spacing"] {
+                    assert!(error.message().contains(word), "{what}: {error}");
+                }
+            }
         }
     }
     println!();

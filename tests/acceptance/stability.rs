@@ -1,5 +1,7 @@
 //! The default CFL number over a full period, from no lateral contraction to nearly incompressible.
 
+use urlsph::{Scene, Simulation};
+
 use crate::support::*;
 
 const E: f64 = 1.7e7;
@@ -74,4 +76,47 @@ fn twisting_is_stable() {
 fn tension_is_stable() {
     stable("column_tension", M1);
     stable("column_tension", M2);
+}
+
+/// A free block with velocities that differ from particle to particle: every wave that the particles
+/// can carry, the shortest above all.
+fn shaken(neighbours: u8, nu: f64, cfl: Option<f64>) -> Simulation {
+    let cfl = cfl.map_or(String::new(), |cfl| format!(r#", "cfl": {cfl}"#));
+    let text = format!(
+        r#"{{"geometry": {{"box": {{"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.125}}}},
+        "material": {{"neo_hookean": {{"density": 1000, "youngs_modulus": 1e9, "poisson_ratio": {nu}}}}},
+        "initial": {{"velocity": [
+            "1e-3*sin(7919*X + 104729*Y*Y + 1299709*Z*Z*Z + 31*X*Z)",
+            "1e-3*sin(6151*X*X + 7877*Y + 224737*Z*Z + 17*Y*X)",
+            "1e-3*sin(3571*X*X*X + 49999*Y*Y + 611953*Z + 13*Z*Y)"]}},
+        "numerics": {{"neighbours": {neighbours}{cfl}}},
+        "time": {{"end": 1}}}}"#
+    );
+    let scene = Scene::from_json(&text, &[]).unwrap_or_else(|e| panic!("{e}"));
+    Simulation::with_threads(scene, 1).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The default bears a step that is a little larger.
+#[test]
+fn random_velocities_die_down_at_more_than_the_default_step() {
+    const MARGIN: f64 = 1.05;
+    println!("| neighbours | Poisson ratio | CFL | kinetic energy left |\n|---|---|---|---|");
+    for neighbours in [6, 18, 26] {
+        for nu in [-0.5, 0.0, 0.3, 0.495] {
+            let cfl = MARGIN * shaken(neighbours, nu, None).cfl_number();
+            let mut simulation = shaken(neighbours, nu, Some(cfl));
+            let start = simulation.energies().kinetic;
+            let end = 600.0 * simulation.stable_step();
+            simulation
+                .advance(end)
+                .unwrap_or_else(|e| panic!("{neighbours} neighbours, nu = {nu}: {e}"));
+            let left = simulation.energies().kinetic / start;
+            println!("| {neighbours} | {nu} | {cfl:.3} | {left:.1e} |");
+            check(
+                &format!("{neighbours} neighbours, nu = {nu}: energy left"),
+                left,
+                0.1,
+            );
+        }
+    }
 }

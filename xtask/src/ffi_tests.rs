@@ -10,8 +10,12 @@ use xshell::{Shell, cmd};
 use crate::tally::Tally;
 use crate::{header, install, project, venv, wheel};
 
-/// A column, and a metal with heat.
-const SCENES: [&str; 2] = ["ffi-tests/scene.json", "ffi-tests/metal.json"];
+/// A column, a metal with heat, and a block between planes of contact.
+const SCENES: [&str; 3] = [
+    "ffi-tests/scene.json",
+    "ffi-tests/metal.json",
+    "ffi-tests/contact.json",
+];
 
 /// `cargo xtask ffi-tests`: these alone.
 pub fn run(sh: &Shell) -> Result<()> {
@@ -241,7 +245,7 @@ impl Setup {
         Ok(tally)
     }
 
-    /// examples/coupling_structure: the program checks what must hold.
+    /// examples/coupling_structure, shared and static: the program checks what must hold.
     fn structural_coupling(&self, sh: &Shell) -> Result<Tally> {
         let build = self.cmake(
             sh,
@@ -249,13 +253,23 @@ impl Setup {
             "coupling_structure",
             &["-DCMAKE_BUILD_TYPE=Release"],
         )?;
+        let says = "the structural coupling holds";
         let residuals = build.join("residuals.csv");
         let residuals = residuals.to_str().context("the path is not UTF-8")?;
-        let mut tally = self.example(
-            sh,
-            &build.join("coupling_structure"),
-            &[residuals],
-            "the structural coupling holds",
+        let mut tally = self.example(sh, &build.join("coupling_structure"), &[residuals], says);
+        let same = build.join("residuals_static.csv");
+        let path = same.to_str().context("the path is not UTF-8")?;
+        tally += self.example(sh, &build.join("coupling_structure_static"), &[path], says);
+        tally += Tally::of(
+            sh.read_file(residuals)
+                .map_err(Error::from)
+                .and_then(|first| {
+                    ensure!(
+                        first == sh.read_file(&same)?,
+                        "the shared and the static library do not give the same iterations"
+                    );
+                    Ok(())
+                }),
         );
         let (python, picture) = (&self.python, build.join("residuals.png"));
         let drawn = cmd!(

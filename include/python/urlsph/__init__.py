@@ -26,6 +26,8 @@ from ._errors import (
 )
 from ._library import library_path, library_version
 from ._simulation import (
+    Contact,
+    ContactResultant,
     Energies,
     Field,
     HeatResultant,
@@ -45,6 +47,8 @@ __version__ = library_version()
 __all__ = [
     "BusyError",
     "CancelledError",
+    "Contact",
+    "ContactResultant",
     "DivergedError",
     "Energies",
     "Error",

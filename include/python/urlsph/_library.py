@@ -98,6 +98,7 @@ class CountsStruct(Structure):
         ("inputs", c_size_t),
         ("threads", c_size_t),
         ("steps", c_uint64),
+        ("contacts", c_size_t),
     ]
 
 
@@ -182,6 +183,19 @@ class HeatResultantStruct(Structure):
     ]
 
 
+class ContactInfoStruct(Structure):
+    _fields_ = [("name", c_char_p), ("point", c_double * 3), ("normal", c_double * 3)]
+
+
+class ContactResultantStruct(Structure):
+    _fields_ = [
+        ("force", c_double * 3),
+        ("impulse", c_double * 3),
+        ("displacement", c_double),
+        ("particles", c_size_t),
+    ]
+
+
 class ProbeMotionStruct(Structure):
     _fields_ = [
         ("displacement", c_double * 3),
@@ -228,6 +242,9 @@ _SIGNATURES = {
     "urlsph_read_patch_normals": _SET,
     "urlsph_get_resultant": _get(ResultantStruct, c_size_t),
     "urlsph_get_heat_resultant": _get(HeatResultantStruct, c_size_t),
+    "urlsph_find_contact": _FIND,
+    "urlsph_get_contact_info": _get(ContactInfoStruct, c_size_t),
+    "urlsph_get_contact_resultant": _get(ContactResultantStruct, c_size_t),
     "urlsph_find_field": _FIND,
     "urlsph_get_field_info": _get(FieldInfoStruct, c_size_t),
     "urlsph_read_field": _SET,

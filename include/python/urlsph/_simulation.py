@@ -85,6 +85,15 @@ class HeatResultant(NamedTuple):
     maximum_temperature: float  #: of its particles [K]
 
 
+class ContactResultant(NamedTuple):
+    """What a plane of contact does to the body."""
+
+    force: np.ndarray  #: [N], without the impulses of impacts
+    impulse: np.ndarray  #: since time 0, with those of impacts [N s]
+    displacement: float  #: of the plane along its normal since time 0 [m]
+    particles: int  #: that touch the plane
+
+
 class ProbeMotion(NamedTuple):
     """Motion of a probe, and its temperature."""
 
@@ -102,6 +111,15 @@ class Patch(NamedTuple):
     particles: np.ndarray  #: numbers of the particles, ascending
     areas: np.ndarray  #: tributary areas [m^2]
     normals: np.ndarray  #: unit outward normals, particles x 3
+
+
+class Contact(NamedTuple):
+    """A rigid frictionless plane."""
+
+    name: str
+    index: int
+    point: np.ndarray  #: of the plane at time 0 [m]
+    normal: np.ndarray  #: unit, towards the body
 
 
 class Field(NamedTuple):
@@ -334,6 +352,7 @@ class Simulation:
         self._exports: "weakref.WeakSet[_Memory]" = weakref.WeakSet()
         self._fields: Optional[Dict[str, Field]] = None
         self._patches: Optional[Dict[str, Patch]] = None
+        self._contacts: Optional[Dict[str, Contact]] = None
         self._probes: Optional[Dict[str, Probe]] = None
         self._callbacks = _Callbacks(None, None, None)
         self.set_callbacks()
@@ -543,6 +562,26 @@ class Simulation:
         index = self._find(lib.urlsph_find_patch, patch)
         r = self._struct(lib.urlsph_get_heat_resultant, c.HeatResultantStruct, index)
         return HeatResultant(*(getattr(r, name) for name in HeatResultant._fields))
+
+    # Planes of contact.
+
+    @property
+    def contacts(self) -> Dict[str, Contact]:
+        """The planes of contact by name."""
+        if self._contacts is None:
+            contacts = {}
+            for index in range(self._counts().contacts):
+                info = self._struct(lib.urlsph_get_contact_info, c.ContactInfoStruct, index)
+                name = info.name.decode()
+                contacts[name] = Contact(name, index, _array(info.point), _array(info.normal))
+            self._contacts = contacts
+        return self._contacts
+
+    def contact_resultant(self, contact: str) -> ContactResultant:
+        """Force, impulse, displacement and touching particles of a plane of contact now."""
+        index = self._find(lib.urlsph_find_contact, contact)
+        r = self._struct(lib.urlsph_get_contact_resultant, c.ContactResultantStruct, index)
+        return ContactResultant(_array(r.force), _array(r.impulse), r.displacement, r.particles)
 
     # Fields.
 

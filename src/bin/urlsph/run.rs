@@ -183,9 +183,12 @@ fn summary(
     line(
         "wall time",
         format!(
-            "{:.2} s on {} threads, {speed:.2e} particle-steps/s",
+            "{:.2} s on {}, {speed:.2e} particle-steps/s",
             elapsed.as_secs_f64(),
-            simulation.threads()
+            match simulation.threads() {
+                1 => "1 thread".to_owned(),
+                threads => format!("{threads} threads"),
+            }
         ),
     );
     let stored = |e: &Energies| e.kinetic + e.strain + e.thermal;
