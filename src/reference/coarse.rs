@@ -754,6 +754,7 @@ fn product(one: &[f64], other: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::Reference;
+    use super::super::repair::tests::defects;
     use super::*;
     use crate::neighbours::Graph;
     use crate::parallel::Pool;
@@ -761,7 +762,7 @@ mod tests {
     use crate::scene::Scene;
 
     /// A slender box of irregular particles.
-    fn bar(cells: usize, length: usize) -> Reference {
+    fn bar(cells: usize, length: usize) -> (Particles, Reference) {
         let text = format!(
             r#"{{
             "geometry": {{"box": {{"min": [0, 0, 0], "max": [{cells}, {length}, {cells}], "spacing": 1,
@@ -773,7 +774,8 @@ mod tests {
         let scene = Scene::from_json(&text, &[]).expect("a good scene");
         let particles = Particles::new(&scene).expect("particles");
         let graph = Graph::new(&particles, scene.numerics.neighbours).expect("graph");
-        Reference::new(&particles, &graph, &scene.numerics).expect("operators")
+        let reference = Reference::new(&particles, &graph, &scene.numerics).expect("operators");
+        (particles, reference)
     }
 
     /// Bodies that differ by 10 in length take about as many iterations, on any number of threads.
@@ -783,19 +785,22 @@ mod tests {
             let on = |threads| {
                 let pool = Pool::new(threads).expect("threads");
                 pool.install(|| bar(cells, length))
-                    .closed
-                    .expect("repaired")
             };
-            let one = on(1);
+            let (particles, reference) = on(1);
+            let (closure, complete) = defects(&particles, &reference);
+            let one = reference.closed.expect("repaired");
             let report = one.report;
             println!(
-                "{cells} x {length} x {cells}: {} iterations (60), {:.1e} open (1e-11)",
+                "{cells} x {length} x {cells}: {} iterations (60), {:.1e} open (1e-12), closure \
+                 {closure:.1e} (1e-10), complete {complete:.1e} (1e-13)",
                 report.iterations, report.after
             );
-            assert!(report.iterations < 60 && report.after < 1e-11);
+            assert!(report.iterations < 60 && report.after < 1e-12);
+            assert!(closure < 1e-10 && complete < 1e-13);
             if length == 64 {
                 for threads in [2, 3, 8] {
-                    assert_eq!(on(threads).multipliers, one.multipliers);
+                    let other = on(threads).1.closed.expect("repaired");
+                    assert_eq!(other.multipliers, one.multipliers);
                 }
             }
         }
@@ -806,7 +811,7 @@ mod tests {
     fn the_preconditioner_is_symmetric_and_positive() {
         let pool = Pool::new(2).expect("threads");
         let (asymmetry, least) = pool.install(|| {
-            let bar = bar(5, 40);
+            let (_, bar) = bar(5, 40);
             let area = Array::new(bar.layout, [0.0; 3]);
             let problem = Problem {
                 layout: bar.layout,

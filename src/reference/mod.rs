@@ -39,9 +39,9 @@ use repair::{Flat, Goal, Multipliers, Problem};
 use slices::Slices;
 use updated::{Kernels, PulledBackVectors, PulledBackWeights, SmoothingLength};
 
-/// Tolerance of the closure and most iterations of a repair at the start: round-off, in 20 to 70
+/// Tolerance of the closure and most iterations of a repair at the start: round-off, in 20 to 80
 /// iterations for bodies of 100 to 800 000 particles. Only operators without a repair take them all.
-const AT_START: (f64, usize) = (1e-11, 250);
+const AT_START: (f64, usize) = (1e-12, 250);
 /// The same at updates of the reference, from the multipliers before.
 const AT_UPDATES: (f64, usize) = (1e-6, 8);
 /// Root mean square of the closure's defect, over the areas, that cannot be left to stand.

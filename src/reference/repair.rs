@@ -737,7 +737,7 @@ impl Work for Size<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::{PairVectors, Reference, with_pairs};
     use super::*;
     use crate::neighbours::Graph;
@@ -785,7 +785,10 @@ mod tests {
 
     /// Largest defects of the closure over V^(2/3) and of the linear completeness over 2 V.
     #[allow(clippy::let_unit_value, reason = "stored vectors have no centre")]
-    fn defects(particles: &Particles, reference: &Reference) -> (f64, f64) {
+    pub(in crate::reference) fn defects(
+        particles: &Particles,
+        reference: &Reference,
+    ) -> (f64, f64) {
         let (mut closure, mut complete): (f64, f64) = (0.0, 0.0);
         for i in 0..particles.count() {
             let a = Layout::slot(i);
