@@ -16,6 +16,7 @@
 //! the tributary volume out of k, which makes a uniform stress force-free inside the body; then the
 //! kernel of a pair is the mean of both particles', so that k_ab = k_ba.
 
+mod coarse;
 mod pairs;
 mod repair;
 mod slices;
@@ -38,9 +39,9 @@ use repair::{Flat, Goal, Multipliers, Problem};
 use slices::Slices;
 use updated::{Kernels, PulledBackVectors, PulledBackWeights, SmoothingLength};
 
-/// Tolerance of the closure and most iterations of a repair at the start: round-off for small bodies;
-/// on the cube of 33^3 particles more than 100 iterations change no error by a hundredth.
-const AT_START: (f64, usize) = (1e-11, 250);
+/// Tolerance of the closure and most iterations of a repair at the start: round-off, in 20 to 80
+/// iterations for bodies of 100 to 800 000 particles. Only operators without a repair take them all.
+const AT_START: (f64, usize) = (1e-12, 250);
 /// The same at updates of the reference, from the multipliers before.
 const AT_UPDATES: (f64, usize) = (1e-6, 8);
 /// Root mean square of the closure's defect, over the areas, that cannot be left to stand.
@@ -334,6 +335,7 @@ impl Reference {
             tolerance: AT_START.0,
             scale,
             iterations: AT_START.1,
+            coarse: true,
         };
         let problem = Problem {
             layout: self.layout,
@@ -480,6 +482,7 @@ impl Reference {
                 tolerance: AT_UPDATES.0,
                 scale: closed.scale,
                 iterations: AT_UPDATES.1,
+                coarse: false,
             };
             repair::solve(problem, guess, goal).map(|s| s.0)
         } else {
