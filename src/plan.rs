@@ -52,11 +52,12 @@ pub(crate) fn bytes_per_particle(scene: &Scene, neighbours: f64) -> f64 {
         + when(n.state == StateMeasures::Fhj, 9.0)
         + when(scene.heat.is_some(), 1.0)
         + when(plastic, 7.0);
-    // The initial positions, volumes, L, and the order.
+    // The initial positions, volumes, L, and the order; multipliers and areas of the repair; the spacings.
     let reference = 14.0
         + when(updated, 13.0)
         + when(updated && n.state == StateMeasures::Fhj, 9.0)
-        + when(operators == Operators::Repaired, 34.0)
+        + when(operators == Operators::Repaired, 15.0)
+        + when(plastic && operators == Operators::Kernel, 6.0)
         + when(updated && operators == Operators::Repaired, 3.0);
     // Q, the wave speed's, forces, grad v; S and the half gradient.
     let rates = 23.0

@@ -554,6 +554,14 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
 /// a third more, 1.1 nothing. Noise dies out up to 1.5.
 const MOST: f64 = 1.2;
 
+/// What is left of a particle's reconstruction, given what its jumps dissipate and what half of the
+/// reconstructed steps take of it.
+#[inline(always)]
+fn bounded_share<T: Lane>(jumps: T, half_steps: T) -> T {
+    let (steps, limit) = (half_steps + half_steps, jumps.of(MOST) * jumps);
+    (steps - limit).if_positive(limit / steps, jumps.of(1.0))
+}
+
 /// Scales the gradients for the reconstruction so that they do not make energy.
 ///
 /// Half of what a pair dissipates belongs to each of its particles: sum_b dv . K (dv - g_a dx) / 2, K being
@@ -577,7 +585,7 @@ impl<P: PairVectors> Work for Bound<'_, P> {
             pressure: T::splat(token, self.speeds.pressure),
             shear: T::splat(token, self.speeds.shear),
         };
-        let [zero, one, most] = [0.0, 1.0, MOST].map(|v| T::splat(token, v));
+        let zero = T::splat(token, 0.0);
         for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
             let here = self.input.here::<T>(token, a);
             let centre = self.pairs.centre::<T>(token, a);
@@ -595,8 +603,7 @@ impl<P: PairVectors> Work for Bound<'_, P> {
                 jumps = jumps + dot(d, p.dv);
                 half_steps = half_steps + dot(d, mat_vec(&half, p.dx));
             }
-            let (steps, limit) = (half_steps + half_steps, most * jumps);
-            let share = (steps - limit).if_positive(limit / steps, one);
+            let share = bounded_share(jumps, half_steps);
             store9(&scale9(share, &half), &mut self.half_grad, at);
         }
     }
@@ -648,7 +655,7 @@ impl<P: PairVectors> Work for BoundSlope<'_, P> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) {
-        let [zero, one, most] = [0.0, 1.0, MOST].map(|v| T::splat(token, v));
+        let [zero, one] = [0.0, 1.0].map(|v| T::splat(token, v));
         let speed = T::splat(token, self.pressure_speed);
         for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
             let here = self.input.here::<T>(token, a);
@@ -669,8 +676,7 @@ impl<P: PairVectors> Work for BoundSlope<'_, P> {
                 jumps = d.mul_add(difference, jumps);
                 half_steps = d.mul_add(dot(half, p.dx), half_steps);
             }
-            let (steps, limit) = (half_steps + half_steps, most * jumps);
-            let share = (steps - limit).if_positive(limit / steps, one);
+            let share = bounded_share(jumps, half_steps);
             store3(&scale3(share, half), &mut self.half_slope, at);
         }
     }
