@@ -662,7 +662,7 @@ impl<P: PairVectors> Work for BoundSlope<'_, P> {
             let centre = self.pairs.centre::<T>(token, a);
             let sa = load9::<T>(token, &self.input.s, a);
             let sigma_a = T::load(token, self.sigma, a);
-            let half: Vec3<T> = std::array::from_fn(|c| T::load(token, &self.half_slope[c], at));
+            let half: Vec3<T> = std::array::from_fn(|c| T::load(token, self.half_slope[c], at));
             let (mut jumps, mut half_steps) = (zero, zero);
             for (b, pair) in self.input.reference.slices.of(a) {
                 let (g, back) = self.pairs.pair(token, &centre, b, pair);
