@@ -411,8 +411,8 @@ impl Simulation {
                 "particles {} and {} have come together to {closer:.1e} of their first distance \
                  while the deformation around them gives {deformed:.1e}, so that they are on the way \
                  past each other: raise numerics.dissipation_coefficient if it is below 1, refine the \
-                 spacing, try numerics.operators \"repaired\" or 6 neighbours under high pressure, \
-                 or reduce the load",
+                 spacing, leave out numerics.volume_dissipation, try numerics.operators \"repaired\" or \
+                 6 neighbours under high pressure, or reduce the load",
                 caller(slot),
                 caller(other),
             ),
