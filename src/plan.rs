@@ -42,10 +42,7 @@ pub(crate) fn bytes_per_particle(scene: &Scene, neighbours: f64) -> f64 {
     let updated = n.reference_update != ReferenceUpdate::Never;
     let lattice = scene.geometry.is_lattice();
     let operators = n.operators_on(lattice);
-    let plastic = matches!(
-        scene.material,
-        Material::VonMises(_) | Material::JohnsonCook(_)
-    );
+    let plastic = scene.material.is_plastic();
     // x, v, f, and what the scene adds to them; they are kept twice, for the start of a step too.
     let state = 15.0
         + when(n.state != StateMeasures::F, 1.0)
@@ -172,10 +169,7 @@ pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec
         "contact with rigid planes".to_string(),
     );
     feature(scene.body_force.is_some(), "body force".to_string());
-    let plastic = matches!(
-        scene.material,
-        Material::VonMises(_) | Material::JohnsonCook(_)
-    );
+    let plastic = scene.material.is_plastic();
     if !plastic {
         feature(false, "plasticity".to_string());
     }

@@ -142,7 +142,7 @@ impl<P: PairVectors> Work for Jumps<'_, P> {
                 let dx2 = dot(dx, dx);
                 let mask = T::load(token, weights, pair);
                 length2 = length2.min(mask.if_positive(dx2, far));
-                let c = sub3(mat_vec(&sa, g), mat_vec(&input.area(token, b), back));
+                let c = input.pair_area(&sa, b, (g, back));
                 let theta_b = thermal.divisor(T::load(token, self.theta, b));
                 let norm = dot(c, c).sqrt();
                 areas = areas + norm;

@@ -7,6 +7,7 @@ use crate::lane::{Lane, PerSlot, SLICE, Work};
 use crate::layout::{Array, Layout};
 use crate::material::Deformation;
 use crate::math::*;
+use crate::parallel;
 use crate::reference::{PairVectors, Reference, load3, load9, store3, store9};
 
 /// Read access to a state and its reference, by components.
@@ -246,7 +247,8 @@ pub(super) fn spacings(reference: &Reference) -> Array<6> {
     let mut spacings = Array::new(reference.layout, [0.0; 6]);
     let (x, l) = (&reference.x_initial, &reference.l);
     let weights = reference.slices.weights();
-    for a in (0..reference.layout.particles).map(Layout::slot) {
+    let tensors = parallel::fill(reference.layout.particles, |i| {
+        let a = Layout::slot(i);
         let correction = matrix(&l.get(a));
         let mut sum = [[0.0; 3]; 3];
         let mut shortest = f64::INFINITY;
@@ -260,7 +262,10 @@ pub(super) fn spacings(reference: &Reference) -> Array<6> {
         }
         let scale = 1.0 / (largest_eigenvalue(&sum) * shortest);
         let n = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-        spacings.set(a, n.map(|(r, c)| scale * sum[r][c]));
+        n.map(|(r, c)| scale * sum[r][c])
+    });
+    for (i, tensor) in tensors.into_iter().enumerate() {
+        spacings.set(Layout::slot(i), tensor);
     }
     spacings
 }
@@ -370,6 +375,18 @@ impl<'a> ForceInput<'a> {
     #[inline(always)]
     pub(super) fn area<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
         load9(token, &self.s, a)
+    }
+
+    /// c_ab [m^2], from S_a and the pair vectors.
+    #[inline(always)]
+    pub(super) fn pair_area<T: Lane>(
+        &self,
+        sa: &Mat3<T>,
+        b: usize,
+        (g, back): (Vec3<T>, Vec3<T>),
+    ) -> Vec3<T> {
+        let sb = self.area::<T>(g[0].token(), b);
+        sub3(mat_vec(sa, g), mat_vec(&sb, back))
     }
 
     #[inline(always)]
@@ -498,7 +515,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             let qa = load9::<T>(token, &input.q, a);
             let (mut sa, mut grad_a) = ([zero3(token); 3], [zero3(token); 3]);
             if MODE != riemann::OFF || P::BOUND_BY_AREAS {
-                sa = load9::<T>(token, &input.s, a);
+                sa = input.area::<T>(token, a);
             }
             if riemann::reconstructs(MODE) {
                 grad_a = load9::<T>(token, &input.half_grad, a);
@@ -514,7 +531,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                 length2 = length2.min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
                 let mut f = sub3(mat_vec(&qa, g), mat_vec(&load9(token, &input.q, b), back));
                 if MODE != riemann::OFF || P::BOUND_BY_AREAS {
-                    p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(token, &input.s, b), back));
+                    p.area = input.pair_area(&sa, b, (g, back));
                 }
                 if P::BOUND_BY_AREAS {
                     areas.add(p.area);
@@ -551,14 +568,17 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
 
 /// Most that a reconstructed step may take of what the jumps of a particle dissipate. In smooth flow both
 /// are alike and the differences cancel among neighbours: 1 makes a tetrahedral cylinder in torsion lose
-/// a third more, 1.1 nothing. Noise dies out up to 1.5.
-const MOST: f64 = 1.2;
+/// a third more, 1.1 nothing. Noise still dies out with 1.5.
+const RECONSTRUCTED_SHARE: f64 = 1.2;
 
 /// What is left of a particle's reconstruction, given what its jumps dissipate and what half of the
 /// reconstructed steps take of it.
 #[inline(always)]
 fn bounded_share<T: Lane>(jumps: T, half_steps: T) -> T {
-    let (steps, limit) = (half_steps + half_steps, jumps.of(MOST) * jumps);
+    let (steps, limit) = (
+        half_steps + half_steps,
+        jumps.of(RECONSTRUCTED_SHARE) * jumps,
+    );
     (steps - limit).if_positive(limit / steps, jumps.of(1.0))
 }
 
@@ -568,7 +588,7 @@ fn bounded_share<T: Lane>(jumps: T, half_steps: T) -> T {
 /// D_ab per jump. Were g_a the least-squares fit with the weights K, that would be sum_b |dv - g_a dx|_K^2 / 2.
 /// A repaired gradient, which may owe all of itself to one neighbour, or more, can make it negative, and
 /// modes have grown by it (tetrahedra, nu = 0.495). g_a is scaled where the second term is more than
-/// [`MOST`] times the first.
+/// [`RECONSTRUCTED_SHARE`] times the first.
 pub(super) struct Bound<'a, P> {
     pub pairs: P,
     pub input: ForceInput<'a>,
@@ -589,16 +609,13 @@ impl<P: PairVectors> Work for Bound<'_, P> {
         for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
             let here = self.input.here::<T>(token, a);
             let centre = self.pairs.centre::<T>(token, a);
-            let sa = load9::<T>(token, &self.input.s, a);
+            let sa = self.input.area::<T>(token, a);
             let half = load_slab9::<T>(token, &self.half_grad, at);
             let (mut jumps, mut half_steps) = (zero, zero);
             for (b, pair) in self.input.reference.slices.of(a) {
-                let (g, back) = self.pairs.pair(token, &centre, b, pair);
+                let vectors = self.pairs.pair(token, &centre, b, pair);
                 let mut p = self.input.pair(&here, b);
-                p.area = sub3(
-                    mat_vec(&sa, g),
-                    mat_vec(&load9(token, &self.input.s, b), back),
-                );
+                p.area = self.input.pair_area(&sa, b, vectors);
                 let d = riemann::dissipation(&p, p.dv, speeds);
                 jumps = jumps + dot(d, p.dv);
                 half_steps = half_steps + dot(d, mat_vec(&half, p.dx));
@@ -660,17 +677,14 @@ impl<P: PairVectors> Work for BoundSlope<'_, P> {
         for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
             let here = self.input.here::<T>(token, a);
             let centre = self.pairs.centre::<T>(token, a);
-            let sa = load9::<T>(token, &self.input.s, a);
+            let sa = self.input.area::<T>(token, a);
             let sigma_a = T::load(token, self.sigma, a);
             let half: Vec3<T> = std::array::from_fn(|c| T::load(token, self.half_slope[c], at));
             let (mut jumps, mut half_steps) = (zero, zero);
             for (b, pair) in self.input.reference.slices.of(a) {
-                let (g, back) = self.pairs.pair(token, &centre, b, pair);
+                let vectors = self.pairs.pair(token, &centre, b, pair);
                 let mut p = self.input.pair(&here, b);
-                p.area = sub3(
-                    mat_vec(&sa, g),
-                    mat_vec(&load9(token, &self.input.s, b), back),
-                );
+                p.area = self.input.pair_area(&sa, b, vectors);
                 let difference = T::load(token, self.sigma, b) - sigma_a;
                 let d = riemann::volume_dissipation(&p, difference, speed, one);
                 jumps = d.mul_add(difference, jumps);
@@ -709,16 +723,16 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
         for (at, a) in lanes_of::<T>(input.reference, self.slab) {
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
-            let sa = load9::<T>(token, &input.s, a);
+            let sa = input.area::<T>(token, a);
             let (sigma_a, slope_a) = (
                 T::load(token, self.sigma, a),
                 load3::<T>(token, &self.slope, a),
             );
             let (mut rate, mut work) = (T::splat(token, 0.0), T::splat(token, 0.0));
             for (b, pair) in input.reference.slices.of(a) {
-                let (g, back) = pairs.pair(token, &centre, b, pair);
+                let vectors = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
-                p.area = sub3(mat_vec(&sa, g), mat_vec(&load9(token, &input.s, b), back));
+                p.area = input.pair_area(&sa, b, vectors);
                 let difference = T::load(token, self.sigma, b) - sigma_a;
                 let slopes = add3(slope_a, load3(token, &self.slope, b));
                 let jump = difference - dot(slopes, p.dx);

@@ -157,6 +157,11 @@ impl Material {
             ),
         }
     }
+
+    /// Whether the law yields.
+    pub(crate) fn is_plastic(&self) -> bool {
+        matches!(self, Self::VonMises(_) | Self::JohnsonCook(_))
+    }
 }
 
 pub(super) fn validate(material: &Material) -> Result<()> {
