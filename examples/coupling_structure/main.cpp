@@ -84,7 +84,7 @@ Membrane membrane_on(const Pad& pad, double mass) {
             if (std::abs(std::hypot(dx, dz) - spacing) > 1e-6 * spacing) continue;
             m.links.emplace_back(i, j);
             // A link along the edge carries half a strip.
-            m.widths.push_back(std::min(areas[i], areas[j]) / (spacing * spacing) >= 0.9 ? 1.0 : 0.5);
+            m.widths.push_back(std::max(areas[i], areas[j]) / (spacing * spacing) >= 0.9 ? 1.0 : 0.5);
         }
     }
     return m;
@@ -207,6 +207,10 @@ void check(bool holds, const char* what) {
 
 int main(int argc, char** argv) try {
     std::FILE* log = argc > 1 ? std::fopen(argv[1], "w") : nullptr;
+    if (argc > 1 && !log) {
+        std::perror(argv[1]);
+        return 1;
+    }
     if (log) std::fprintf(log, "membrane,step,iteration,residual\n");
     constexpr double h = 1e-4;
     struct Case {
@@ -222,7 +226,8 @@ int main(int argc, char** argv) try {
         if (once.completed) {
             std::printf("  explicit: largest deflection %.4f mm\n", 1e3 * once.deflection);
         } else {
-            std::printf("  explicit: unstable, beyond all bounds at %.2f ms\n", 1e3 * once.broke_at);
+            std::printf("  explicit: unstable, largest deflection %.1f mm before it ends at %.2f ms\n",
+                        1e3 * once.deflection, 1e3 * once.broke_at);
         }
         std::printf("  implicit: largest deflection %.4f mm, %.1f iterations per step, at most %d\n",
                     1e3 * iterated.deflection,
@@ -236,7 +241,7 @@ int main(int argc, char** argv) try {
         check(iterated.reduction < 0.8, "the residual falls per iteration");
         check(iterated.work_gap < 1e-9, "the work agrees");
     }
-    // The coupling's own error falls with the step, for both kinds of coupling to the same answer.
+    // The implicit coupling's own error falls with the step.
     const Outcome coarse = couple(20.0, h, true, nullptr, ""), fine = couple(20.0, h / 2, true, nullptr, ""),
                   finest = couple(20.0, h / 4, true, nullptr, "");
     if (!coarse.completed || !fine.completed || !finest.completed) {
