@@ -394,13 +394,14 @@ private:
     }
 
     void check(urlsph_status status) const {
+        // It leaves no error behind, and what a callback has thrown belongs to the call under way.
+        if (status == URLSPH_BUSY) throw Error(status);
         // What a callback has thrown during the call is the better story.
         if (calls_ && calls_->thrown) std::rethrow_exception(std::exchange(calls_->thrown, {}));
         if (status == URLSPH_OK) return;
         urlsph_error error;
-        // A busy or a wrong handle leaves no error behind: then the status is all there is.
-        if (status == URLSPH_BUSY ||
-            urlsph_get_last_error(handle_, &error, sizeof error) != URLSPH_OK ||
+        // A wrong handle leaves no error behind: then the status is all there is.
+        if (urlsph_get_last_error(handle_, &error, sizeof error) != URLSPH_OK ||
             error.code != status) {
             throw Error(status);
         }

@@ -448,8 +448,6 @@ def test_busy_from_another_thread(column):
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a POSIX signal")
 def test_ctrl_c_ends_a_step(column):
-    # A job that a shell has put into the background inherits that Ctrl-C is ignored.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     running = threading.Event()
     start = time.monotonic()
     column.set_callbacks(
@@ -472,6 +470,27 @@ def test_ctrl_c_ends_a_step(column):
         thread.join()
         signal.signal(signal.SIGINT, inherited)
     column.step(1e-5)
+
+
+def test_a_busy_call_leaves_the_exception_to_the_step(column):
+    refused = []
+
+    def interrupted(_):
+        # Ctrl-C is the step's to raise, though another call comes before its end.
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(urlsph.BusyError):
+            column.time
+        refused.append(True)
+
+    column.set_callbacks(progress=interrupted)
+    # A shell that starts the tests in the background has Ctrl-C ignored.
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            column.step(1.0)
+    finally:
+        signal.signal(signal.SIGINT, inherited)
+    assert refused == [True]
 
 
 README = (ROOT / "include" / "python" / "README.md").read_text()

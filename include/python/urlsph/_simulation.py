@@ -395,7 +395,9 @@ class Simulation:
         if self._handle is None:
             raise ValueError("the simulation is closed")
         status = function(self._handle, *arguments)
-        self._callbacks.raise_again()
+        # What a callback has raised belongs to the call under way, not to one that finds it busy.
+        if status != Status.BUSY:
+            self._callbacks.raise_again()
         check(status, self._handle)
 
     def _change(self, function, *arguments) -> None:
