@@ -278,14 +278,14 @@ fn a_roller_does_not_let_go() {
     within("support", f.external_work / -layer - 1.0, 1e-12);
     within(
         "closure",
-        (e.closure_error, f.closure_error).0 / layer,
+        e.closure_error.abs().max(f.closure_error.abs()) / layer,
         1e-12,
     );
     for s in [&mut s, &mut t] {
         s.advance(0.1).expect("it runs");
     }
     assert_eq!(s.contact(0).particles, 9);
-    assert!(s.contact(0).force[2] < 0.0 || s.time() < 0.0632);
+    assert!(s.contact(0).force[2] < 0.0);
     let (x, y) = (field(&s, Field::Position), field(&t, Field::Position));
     let differ = x.iter().zip(&y).map(|(x, y)| (x - y).abs());
     within("positions", differ.fold(0.0, f64::max), 1e-13);
