@@ -42,6 +42,11 @@ def block():
         yield simulation
 
 
+@pytest.mark.skipif("EXPECTED_LIBRARY" not in os.environ, reason="any library will do")
+def test_the_library_is_the_one_that_is_meant():
+    assert urlsph.library_path() == os.environ["EXPECTED_LIBRARY"]
+
+
 def test_versions():
     header = (ROOT / "include" / "urlsph.h").read_text()
     assert f'#define URLSPH_VERSION "{urlsph.__version__}"' in header

@@ -239,7 +239,7 @@ impl Setup {
     fn cpp_example(&self, sh: &Shell) -> Result<Tally> {
         let build = self.cmake(sh, "examples/cpp_cmake", "cpp_cmake", &[])?;
         let mut tally = Tally::default();
-        for program in ["swinging_column", "swinging_column_static"] {
+        for program in ["shaken_column", "shaken_column_static"] {
             tally += self.example(sh, &build.join(program), &[], "time steps");
         }
         Ok(tally)
@@ -314,27 +314,33 @@ impl Setup {
             "{python} -m pip install --quiet --disable-pip-version-check --no-deps --target {site} {wheel}"
         )
         .run()?;
-        let tests = |path: &Path, library: Option<PathBuf>| {
+        let lib = self.prefix.join("lib");
+        let names = install::SharedLibrary::of_this_platform()?;
+        let installed = lib.join(&names.plain);
+        // Each way must not find the library by another one.
+        let tests = |path: &Path, expected: &Path, variables: &[(&str, &Path)]| {
             let mut command = Command::new(python);
             command
                 .current_dir(project::root())
                 .args(["-B", "-m", "pytest", "-q", "-p", "no:cacheprovider"])
                 .arg("ffi-tests/python")
                 .env("PYTHONPATH", path)
-                .env_remove("URLSPH_LIBRARY")
-                .env("LD_LIBRARY_PATH", self.prefix.join("lib"));
-            if let Some(library) = library {
-                command
-                    .env("URLSPH_LIBRARY", library)
-                    .env_remove("LD_LIBRARY_PATH");
+                .env("EXPECTED_LIBRARY", expected);
+            for variable in ["URLSPH_LIBRARY", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH"] {
+                command.env_remove(variable);
             }
+            command.envs(variables.iter().copied());
             Tally::run(command)
         };
         let sources = Path::new("include/python");
-        let installed = install::SharedLibrary::of_this_platform()?.plain;
-        let mut tally = tests(&site, None)?;
-        tally += tests(sources, Some(self.prefix.join("lib").join(installed)))?;
-        tally += tests(sources, None)?;
+        let bundled = site.join("urlsph").join(&names.plain);
+        let mut tally = tests(&site, &bundled, &[])?;
+        tally += tests(sources, &installed, &[("URLSPH_LIBRARY", &installed)])?;
+        tally += tests(
+            sources,
+            Path::new(&names.soname),
+            &[("LD_LIBRARY_PATH", &lib), ("DYLD_LIBRARY_PATH", &lib)],
+        )?;
         Ok(tally)
     }
 }

@@ -21,7 +21,7 @@ pub struct SharedLibrary {
     /// As Cargo builds it, and as the linker looks for it.
     pub plain: String,
     /// As programs look for it at run time.
-    soname: String,
+    pub soname: String,
     /// As it is stored.
     full: String,
 }
