@@ -7,34 +7,17 @@ Needs matplotlib and meshio (`ffi-tests/requirements.txt`).
 """
 
 import argparse
-import csv
 import math
 import xml.etree.ElementTree
 from pathlib import Path
-
-import matplotlib
-
-matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import matplotlib.ticker
 import meshio
 import numpy as np
-from PIL import Image
+from plotting import read_table, save, style
 
 EXAMPLES = Path(__file__).parent
-
-plt.rcParams.update(
-    {
-        "font.size": 9,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.grid": True,
-        "grid.alpha": 0.3,
-        "legend.frameon": False,
-        "lines.linewidth": 1.4,
-    }
-)
 
 
 def top_corner_angle(history):
@@ -223,14 +206,6 @@ CASES = {
 }
 
 
-def read_table(path):
-    """Columns of a CSV file by name."""
-    with open(path, newline="") as file:
-        rows = list(csv.reader(file))
-    values = np.array(rows[1:], dtype=float)
-    return {name: values[:, i] for i, name in enumerate(rows[0])}
-
-
 def read_fields(folder, time, colour):
     """The written state nearest to a time: time, initial positions, displacements, colours."""
     sets = xml.etree.ElementTree.parse(folder / "fields.pvd").iter("DataSet")
@@ -323,16 +298,13 @@ def main():
     example = CASES[arguments.case]
     expected = EXAMPLES / arguments.case / "expected.csv"
     history = read_table(arguments.run / "history.csv")
+    style()
     figure, (left, right) = plt.subplots(
         1, 2, figsize=(10, 3.8), dpi=110, width_ratios=(1.5, 1), layout="constrained"
     )
     draw_curves(right, example, history, read_table(expected) if expected.exists() else None)
     draw_particles(figure, left, example, arguments.run)
-    figure.canvas.draw()
-    # A palette makes the file a third as large; coverage keeps the rare ends of the colour bar.
-    picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
-    picture = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE)
-    picture.save(arguments.picture or EXAMPLES / arguments.case / "picture.png", optimize=True)
+    save(figure, arguments.picture or EXAMPLES / arguments.case / "picture.png")
 
 
 if __name__ == "__main__":

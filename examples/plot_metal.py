@@ -9,38 +9,25 @@ Needs matplotlib and meshio (`ffi-tests/requirements.txt`).
 """
 
 import argparse
-import csv
 import json
 import math
 import xml.etree.ElementTree
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-
 import matplotlib.pyplot as plt
 import meshio
 import numpy as np
-from PIL import Image
+from plotting import read_table, save
 
 EXAMPLES = Path(__file__).parent
 
-# The case: columns of the reference for radius and length, whether length is from foot to top.
+# The case: columns of the reference for radius and length.
 REFERENCES = {"copper_impact": ("radius", "length")}
 NAMES = {
     "equivalent_plastic_strain": ("plastic strain", 1),
     "temperature": ("temperature [K]", 1),
     "pressure": ("pressure [MPa]", 1e-6),
 }
-
-
-def read_table(path):
-    """Columns of a CSV file by name."""
-    with open(path, newline="") as file:
-        rows = list(csv.reader(file))
-    values = np.array(rows[1:], dtype=float)
-    return {name: values[:, i] for i, name in enumerate(rows[0])}
 
 
 def states(folder):
@@ -158,10 +145,7 @@ def main():
     draw_states(left.subplots(), arguments.run, "equivalent_plastic_strain", other)
     diagrams = right.subplots(histories(arguments.run), 1, sharex=True, squeeze=False)[:, 0]
     draw_curves(diagrams, arguments.case, [arguments.run, *arguments.beside])
-    figure.canvas.draw()
-    picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
-    picture = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE)
-    picture.save(arguments.picture or EXAMPLES / arguments.case / "picture.png", optimize=True)
+    save(figure, arguments.picture or EXAMPLES / arguments.case / "picture.png")
 
 
 if __name__ == "__main__":

@@ -2,8 +2,7 @@
 
     python examples/cable/picture.py URLSPH [PICTURE.png]
 
-runs both scenes with the command line URLSPH and draws them. Needs matplotlib, and the modules of
-`plot_example.py`.
+runs both scenes with the command line URLSPH and draws them. Needs matplotlib.
 """
 
 import subprocess
@@ -15,9 +14,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 
 import matplotlib.pyplot as plt
-import numpy as np
-from PIL import Image
-from plot_example import read_table
+from plotting import read_table, save, style
 
 NAME = "probe.middle.velocity[1]"
 CURVES = {"none": "#9aa0a6", "minmod": "#d9822b", "shock": "#1f5fa8"}
@@ -37,6 +34,7 @@ def history(urlsph, scene, limiter, folder):
 def main():
     urlsph = sys.argv[1]
     picture = Path(sys.argv[2]) if len(sys.argv) > 2 else HERE / "picture.png"
+    style()
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.6), dpi=110, layout="constrained", sharey=True)
     with tempfile.TemporaryDirectory() as folder:
         for ax, scene, expected, title in (
@@ -52,9 +50,7 @@ def main():
             ax.set_xlabel("time [s]")
     axes[0].set_ylabel("velocity at X = 5 m [mm/s]")
     axes[1].legend()
-    figure.canvas.draw()
-    image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
-    image.quantize(256, method=Image.Quantize.MAXCOVERAGE).save(picture, optimize=True)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

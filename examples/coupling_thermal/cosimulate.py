@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from fmu import Fmu
-from layers import Pulse, film_heat_capacity, temperatures
+from layers import Pulse, temperatures
 
 HERE = Path(__file__).parent
 
@@ -46,9 +46,7 @@ def couple(film_path, substrate_path, step, end):
             row = {"time": film.time}
             for name in ["surface", "interface"]:
                 row[f"temperature.{name}"] = film.get(f"probe.{name}.temperature")
-            row["displacement.surface"] = film.get("probe.surface.displacement[2]") if film.second else (
-                film.instance.getFloat64([film.references["probe.surface.displacement"]], nValues=3)[1]
-            )
+            row["displacement.surface"] = film.get_vector("probe.surface.displacement")[1]
             for name in ENERGIES:
                 row[f"film.{name}"] = film.get(f"energy.{name}") / area
             row["film.heat_flow"] = film.get("boundary.y_min.heat_flow") / area

@@ -44,6 +44,12 @@ class Fmu:
         get = self.instance.getReal if self.second else self.instance.getFloat64
         return get([self.references[name]])[0]
 
+    def get_vector(self, name):
+        """Its three components, which FMI 2.0 has as scalars."""
+        if self.second:
+            return [self.get(f"{name}[{i}]") for i in (1, 2, 3)]
+        return self.instance.getFloat64([self.references[name]], nValues=3)
+
     def set(self, name, value):
         set_ = self.instance.setReal if self.second else self.instance.setFloat64
         set_([self.references[name]], [value])

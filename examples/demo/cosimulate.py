@@ -161,7 +161,8 @@ def main():
     end = scene["time"]["end"]
 
     alone, alone_frames = read_run(arguments.alone)
-    files = FieldFiles(out, every=round(scene["output"]["field_interval"] / STEP))
+    interval = scene["output"]["field_interval"]
+    files = FieldFiles(out, every=round(interval / STEP))
     history = couple(arguments.fmu, STEP, end, files)
     write_csv(out / "history.csv", history)
 
@@ -172,7 +173,7 @@ def main():
     errors = [work_difference(run)[2] for run in (coarse, fine)]
     column_work, damper_work, difference = work_difference(history)
 
-    pictures.snapshots(out / "snapshots.png", alone_frames, files.frames, "von_mises_stress")
+    pictures.snapshots(out / "snapshots.png", alone_frames, files.frames, interval, "von_mises_stress")
     pictures.histories(out / "histories.png", alone, history)
     pictures.energies(out / "energies.png", history)
 

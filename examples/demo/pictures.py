@@ -47,8 +47,9 @@ def upright(points):
     return np.stack([x, -z, y], axis=-1)
 
 
-def snapshots(path, alone, coupled, field, times=(0.5, 1.4, 2.3, 3.2, 4.1, 5.0), interval=0.1):
-    """The two columns at several times, coloured by a stress [Pa]; the damper as a ball on a spring."""
+def snapshots(path, alone, coupled, interval, field, times=(0.5, 1.4, 2.3, 3.2, 4.1, 5.0)):
+    """The two columns at several times, coloured by a stress [Pa], from frames of an interval [s]; the
+    damper as a ball on a spring."""
     index = [round(time / interval) for time in times]
     most = max(np.quantile(alone[k][field], 0.995) for k in index) / 1e6
     colours = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(0, most), "viridis")
