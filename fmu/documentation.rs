@@ -105,8 +105,10 @@ fn usage(xml: &mut Xml, simulation: &Simulation, table: &Table) -> io::Result<()
         "The state of the FMU can be stored, restored and serialised: a step that is repeated from a \
          stored state gives the same bits, with any number of threads."
             .to_owned(),
-        "Parameters can be set until the end of initialisation. A value that is not admissible is \
-         refused when it is set."
+        "Parameters can be set until the end of initialisation, in any order. A value that is not \
+         admissible is refused when it is set; values that do not go together, such as a yield stress \
+         above the saturation stress, are refused at the end of initialisation, and when an output is \
+         read before."
             .to_owned(),
         "If the solution diverges, the step fails with the particle, field and time in the log, and the \
          last good state stays readable: continue from a stored state with other inputs, or reset."

@@ -228,10 +228,10 @@ impl Instance {
     /// Reads variables, one after the other.
     ///
     /// # Errors
-    /// An unknown reference, a variable of another type, a wrong number of values.
+    /// An unknown reference, a variable of another type, a wrong number of values; for an output those
+    /// of setting up the scene with parameters that were just set.
     pub fn get(&mut self, kind: Kind, references: &[u32], out: &mut [f64]) -> Result<()> {
         self.check_length(kind, references, out.len())?;
-        self.update()?;
         let mut rest = out;
         // An array of which FMI 2.0 asks the elements one by one.
         let mut array: (usize, Vec<f64>) = (usize::MAX, Vec::new());
@@ -317,7 +317,8 @@ impl Instance {
             }
         }
         if parameters != self.parameters {
-            self.scene_with(&parameters)?;
+            // Importers set one after the other: what they must be together counts at the end.
+            Scene::admits(&self.scene, &self.overrides(&parameters))?;
             self.parameters = parameters;
         }
         let mut rest = values;
@@ -483,17 +484,15 @@ impl Instance {
         Ok(())
     }
 
-    fn scene_with(&self, parameters: &[f64]) -> Result<Scene> {
-        let overrides: Vec<String> = self
-            .table
+    fn overrides(&self, parameters: &[f64]) -> Vec<String> {
+        self.table
             .parameters
             .iter()
             .zip(parameters)
             // A value that was not changed is left as the scene has it, given or by default.
             .filter(|(parameter, value)| **value != parameter.start)
             .filter_map(|(parameter, value)| parameter.scene_override(*value))
-            .collect();
-        self.simulation.scene().again(&self.scene, &overrides)
+            .collect()
     }
 
     fn build(&self, parameters: &[f64]) -> Result<Simulation> {
@@ -504,10 +503,13 @@ impl Instance {
             .zip(parameters)
             .find(|(p, _)| p.path.is_none());
         let threads = threads.map_or(0, |(_, &n)| n as usize);
-        Simulation::with_threads(self.scene_with(parameters)?, threads)
+        let overrides = self.overrides(parameters);
+        let scene = self.simulation.scene().again(&self.scene, &overrides)?;
+        Simulation::with_threads(scene, threads)
     }
 
     fn read(&mut self, output: usize, values: &mut [f64]) -> Result<()> {
+        self.update()?;
         self.reader
             .read(&self.simulation, &self.table.outputs[output], values)
     }

@@ -606,6 +606,7 @@ fn bad_values_are_refused_with_their_place() {
         (&steel("yield_stress", 0.0), S, "material.von_mises.yield_stress", &["above 0 instead of 0"]),
         (&steel("hardening_modulus", -1.0), S, "material.von_mises.hardening_modulus", &["0 or more, instead of -1"]),
         (&steel("saturation_stress", 9.0), S, "material.von_mises.saturation_stress", &["not below `yield_stress`, 10, instead of 9"]),
+        (&steel("saturation_stress", -1.0), S, "material.von_mises.saturation_stress", &["above 0 instead of -1"]),
         (&steel("saturation_exponent", 0.0), S, "material.von_mises.saturation_exponent", &["above 0 instead of 0"]),
         (&steel("hardness", 1.0), P, "material.von_mises.hardness", &["unknown key `hardness`", "`saturation_stress`"]),
         (&without("saturation_stress"), S, "material.von_mises.saturation_exponent", &["needs `saturation_stress` too"]),

@@ -66,6 +66,7 @@ SCENES = {
             "von_mises": {
                 "density": 1100.0, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
                 "yield_stress": 1e5, "hardening_modulus": 1e6,
+                "saturation_stress": 2.5e5, "saturation_exponent": 10.0,
             }
         },
         heat={"specific_heat": 500.0, "reference_temperature": 300.0, "conductivity": 40.0,

@@ -239,6 +239,22 @@ def test_parameters(start):
     assert kinetic == pytest.approx(4.0, rel=1e-12)
 
 
+def test_parameters_go_together_at_the_end_of_initialisation(start):
+    instance, other = start("hot", initialize=False), start("hot", initialize=False)
+    # One after the other, as many importers do, though in between they do not go together.
+    instance.set("material.yield_stress", 3e5)
+    assert instance.get("material.yield_stress") == 3e5
+    assert status(instance.get, "energy.kinetic") == ERROR
+    assert status(instance.set, "material.saturation_stress", -1.0) == ERROR
+    assert status(instance.initialize) == ERROR
+    instance.set("material.saturation_stress", 4e5)
+    instance.fmu.exitInitializationMode()
+    other.initialize(material__saturation_stress=4e5, material__yield_stress=3e5)
+    for driver in (instance, other):
+        driver.step(0.01)
+    assert instance.observe() == other.observe()
+
+
 def test_any_number_of_threads_gives_the_same_bits(start):
     results = []
     for threads in (1, 2, 3, 8):

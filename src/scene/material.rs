@@ -164,6 +164,7 @@ impl Material {
     }
 }
 
+/// Checks every value by itself.
 pub(super) fn validate(material: &Material) -> Result<()> {
     let (kind, [density, youngs_modulus, poisson_ratio]) = material.elastic();
     let path = |name: &str| format!("material.{kind}.{name}");
@@ -195,14 +196,7 @@ pub(super) fn validate(material: &Material) -> Result<()> {
             match (m.saturation_stress, m.saturation_exponent) {
                 (None, None) => {}
                 (Some(stress), Some(exponent)) => {
-                    require(
-                        stress.is_finite() && stress >= m.yield_stress,
-                        &path("saturation_stress"),
-                        &format!(
-                            "expected a finite number not below `yield_stress`, {}, instead of {stress}",
-                            m.yield_stress
-                        ),
-                    )?;
+                    positive("saturation_stress", stress)?;
                     positive("saturation_exponent", exponent)?;
                 }
                 (stress, _) => {
@@ -234,15 +228,32 @@ pub(super) fn validate(material: &Material) -> Result<()> {
             ] {
                 not_negative(name, value)?;
             }
-            require(
-                m.transition_temperature < m.melting_temperature,
-                &path("transition_temperature"),
-                &format!(
-                    "expected less than `melting_temperature`, {}, instead of {}",
-                    m.melting_temperature, m.transition_temperature
-                ),
-            )?;
         }
     }
     Ok(())
+}
+
+/// Checks the values against each other.
+pub(super) fn validate_together(material: &Material) -> Result<()> {
+    match material {
+        Material::VonMises(m) => match m.saturation_stress {
+            Some(stress) if stress < m.yield_stress => Err(Error::scene(
+                "material.von_mises.saturation_stress",
+                format!(
+                    "expected a number not below `yield_stress`, {}, instead of {stress}",
+                    m.yield_stress
+                ),
+            )),
+            _ => Ok(()),
+        },
+        Material::JohnsonCook(m) => require(
+            m.transition_temperature < m.melting_temperature,
+            "material.johnson_cook.transition_temperature",
+            &format!(
+                "expected less than `melting_temperature`, {}, instead of {}",
+                m.melting_temperature, m.transition_temperature
+            ),
+        ),
+        Material::NeoHookean(_) | Material::MooneyRivlin(_) | Material::LinearElastic(_) => Ok(()),
+    }
 }

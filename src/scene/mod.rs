@@ -151,6 +151,15 @@ impl Scene {
         Ok(scene)
     }
 
+    /// Whether overrides of material, heat and numerics are admissible, each by itself: what they have
+    /// to be together shows when the scene is read [`again`](Self::again).
+    #[cfg(feature = "fmi")]
+    pub(crate) fn admits(text: &str, overrides: &[String]) -> Result<()> {
+        parse::parse(text, overrides)?
+            .parameters()
+            .map_err(|e| parse::with_override(e, overrides))
+    }
+
     /// Reads, parses and validates a scene file; see [`from_json`](Self::from_json). Files that the
     /// scene names are relative to its folder.
     ///

@@ -15,10 +15,8 @@ impl Scene {
     /// machine can hold.
     pub fn validate(&self) -> Result<()> {
         geometry::validate(&self.geometry)?;
-        material::validate(&self.material)?;
-        if let Some(heat) = &self.heat {
-            heat::validate(heat)?;
-        }
+        self.parameters()?;
+        material::validate_together(&self.material)?;
         self.patches_and_conditions()?;
         if let Some(force) = &self.body_force {
             let function = condition::load("body_force", force)?;
@@ -34,11 +32,19 @@ impl Scene {
             "initial.temperature",
             "the body has no temperature: add a section `heat`",
         )?;
-        numerics::validate(&self.numerics)?;
         self.probes_inside()?;
         positive("time.end", self.time.end)?;
         output(&self.output)?;
         geometry::capacity(self, geometry::available_memory())
+    }
+
+    /// Checks the values of material, heat and numerics, without the rules between those of the material.
+    pub(super) fn parameters(&self) -> Result<()> {
+        material::validate(&self.material)?;
+        if let Some(heat) = &self.heat {
+            heat::validate(heat)?;
+        }
+        numerics::validate(&self.numerics)
     }
 
     fn patches_and_conditions(&self) -> Result<()> {
