@@ -193,19 +193,28 @@ fn quiet_says_nothing() {
 fn check_prints_the_plan_and_writes_nothing() {
     let bench = Bench::new();
     let printed = bench.succeeds(&["check", "scene.json"]);
-    for word in [
-        "Small column",
-        "particles",
-        "63",
-        "neighbours",
-        "stable step",
-        "steps",
-        "memory",
-        "on ",
-        "off ",
+    let only = |name: &str| match lines(&printed, name)[..] {
+        [text] => text,
+        ref found => panic!("{name}: {found:?} in:\n{printed}"),
+    };
+    assert_eq!(only("scene"), "Small column");
+    assert_eq!(only("particles"), "63");
+    assert_eq!(
+        only("neighbours"),
+        "6 to 18, 10.7 on average (676 directed pairs)"
+    );
+    for (name, start, end) in [
+        ("memory", "0.", " kB per particle)"),
+        ("stable", "step ", " s at the start"),
+        ("steps", "about ", " to the end at 0.01 s"),
     ] {
-        assert!(printed.contains(word), "{word} in:\n{printed}");
+        let text = only(name);
+        let fits = text.starts_with(start) && text.ends_with(end);
+        assert!(fits, "{name}: {text}");
     }
+    assert_eq!(lines(&printed, "patch").len(), 2, "{printed}");
+    assert!(lines(&printed, "on").contains(&"neo-Hookean elasticity"));
+    assert!(lines(&printed, "off").contains(&"heat"));
     assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), 1);
 }
 
