@@ -1,27 +1,11 @@
 //! Supports, loads and what the ledger and the resultants say of them.
 #![allow(missing_docs)]
 
-use urlsph::{Code, Field, Quantity, Scene, Simulation};
+mod common;
 
-const BLOCK: &str = r#"{
-    "geometry": {"box": {"min": [0, 0, 0], "max": [1, 2, 1], "spacing": 0.25}},
-    "material": {"neo_hookean": {"density": 1000, "youngs_modulus": 1e6, "poisson_ratio": 0.3}},
-    "time": {"end": 1}
-}"#;
+use urlsph::{Code, Field, Quantity, Simulation};
 
-fn block(overrides: &[&str]) -> Simulation {
-    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_string()).collect();
-    let scene = Scene::from_json(BLOCK, &overrides).expect("a good scene");
-    Simulation::with_threads(scene, 1).expect("it can be set up")
-}
-
-fn field(simulation: &Simulation, field: Field) -> Vec<f64> {
-    let mut values = vec![0.0; field.info().components * simulation.particle_count()];
-    simulation
-        .read_field(field, &mut values)
-        .expect("the right length");
-    values
-}
+use common::{BLOCK, block, close, field, refuses};
 
 /// |a - b| over a scale, printed beside its tolerance.
 fn near(what: &str, a: [f64; 3], b: [f64; 3], scale: f64, tolerance: f64) {
@@ -103,8 +87,8 @@ fn resultants_balance_the_momentum_and_the_ledger_closes() {
             let after = s.momenta().linear;
             let rate: [f64; 3] = std::array::from_fn(|c| (after[c] - before[c]) / dt);
             scale = scale.max(middle.iter().map(|f| f * f).sum::<f64>().sqrt());
+            near("nodal forces", sum, middle, scale, 1e-9);
             if i == 40 {
-                near("nodal forces", sum, middle, scale, 1e-9);
                 // The difference quotient lags by half its span.
                 near("rate of momentum", rate, middle, scale, 2e-2);
             }
@@ -303,15 +287,7 @@ fn contradictions_and_bad_places_are_refused() {
         (&["probes.far=[9, 9, 9]"], "probes.far", ""),
     ];
     for (overrides, path, text) in cases {
-        let list: Vec<String> = overrides.iter().map(|o| (*o).to_string()).collect();
-        let error = Scene::from_json(BLOCK, &list)
-            .and_then(|scene| Simulation::with_threads(scene, 1))
-            .err()
-            .unwrap_or_else(|| panic!("{overrides:?} was taken"));
-        println!("{error}");
-        assert!(error.to_string().contains(text), "{error}");
-        let place = error.place().path.as_deref().unwrap_or("");
-        assert!(place.starts_with(path), "{place} instead of {path}");
+        refuses(BLOCK, overrides, path, text);
     }
 }
 
@@ -359,13 +335,6 @@ fn warm(overrides: &[&str]) -> Simulation {
 fn heat_flow(s: &Simulation, patch: &str) -> urlsph::HeatResultant {
     s.heat_resultant(s.patch_index(patch).expect("there"))
         .expect("a body with heat")
-}
-
-/// |a / b - 1|, printed beside its tolerance.
-fn close(what: &str, a: f64, b: f64, tolerance: f64) {
-    let d = (a / b - 1.0).abs();
-    println!("{what}: {a} of {b}: {d:e} (tolerance {tolerance:e})");
-    assert!(d <= tolerance, "{what}");
 }
 
 #[test]
@@ -534,18 +503,7 @@ fn heat_conditions_that_make_no_sense_are_refused() {
     ];
     let heat = r#"heat={"specific_heat": 0.1, "reference_temperature": 300}"#;
     for (overrides, path, text) in cases {
-        let list: Vec<String> = std::iter::once(heat)
-            .chain(overrides.iter().copied())
-            .map(str::to_string)
-            .collect();
-        let error = Scene::from_json(BLOCK, &list)
-            .and_then(|scene| Simulation::with_threads(scene, 1))
-            .err()
-            .unwrap_or_else(|| panic!("{overrides:?} was taken"));
-        println!("{error}");
-        assert!(error.to_string().contains(text), "{error}");
-        let place = error.place().path.as_deref().unwrap_or("");
-        assert!(place.starts_with(path), "{place} instead of {path}");
+        refuses(BLOCK, &[&[heat], *overrides].concat(), path, text);
     }
     // The same temperature on both sides of an edge is no contradiction.
     warm(&[

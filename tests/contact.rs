@@ -1,21 +1,11 @@
 //! Rigid frictionless planes: particles touch them, slide along them and leave.
 #![allow(missing_docs)]
 
+mod common;
+
 use urlsph::{Field, Scene, Simulation, Snapshot};
 
-fn simulation(json: &str, overrides: &[&str]) -> Simulation {
-    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_string()).collect();
-    let scene = Scene::from_json(json, &overrides).expect("a good scene");
-    Simulation::with_threads(scene, 1).expect("it can be set up")
-}
-
-fn field(simulation: &Simulation, field: Field) -> Vec<f64> {
-    let mut values = vec![0.0; field.info().components * simulation.particle_count()];
-    simulation
-        .read_field(field, &mut values)
-        .expect("the right length");
-    values
-}
+use common::{field, refuses, simulation};
 
 /// Prints a residual beside its tolerance.
 fn within(what: &str, residual: f64, tolerance: f64) {
@@ -363,14 +353,7 @@ fn bad_planes_are_refused() {
         (r#"contact.floor.friction=0.1"#, "contact.floor", "friction"),
     ];
     for (text, path, message) in cases {
-        let error = Scene::from_json(BLOCK, &[text.to_string()])
-            .and_then(|scene| Simulation::with_threads(scene, 1))
-            .err()
-            .unwrap_or_else(|| panic!("{text} was taken"));
-        println!("{error}");
-        assert!(error.to_string().contains(message), "{error}");
-        let place = error.place().path.as_deref().unwrap_or("");
-        assert!(place.starts_with(path), "{place} instead of {path}");
+        refuses(BLOCK, &[text], path, message);
     }
 }
 

@@ -1,8 +1,12 @@
 //! Bodies that are no lattice, from the outside: scenes, mesh files, patches, probes, errors.
 
+mod common;
+
 use std::path::{Path, PathBuf};
 
 use urlsph::{Code, Error, Field, MeshSummary, Scene, Simulation};
+
+use common::{close, field};
 
 fn example(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -43,12 +47,6 @@ fn area(simulation: &Simulation, patch: &str) -> f64 {
 /// From the momentum at 1 m/s and 1000 kg/m^3.
 fn volume(simulation: &Simulation) -> f64 {
     simulation.momenta().linear[0] / 1000.0
-}
-
-fn close(what: &str, value: f64, exact: f64, tolerance: f64) {
-    let residual = (value / exact - 1.0).abs();
-    println!("{what}: {value:.6e} for {exact:.6e}, {residual:.1e} of {tolerance:.0e}");
-    assert!(residual <= tolerance, "{what}: {value} for {exact}");
 }
 
 #[test]
@@ -159,10 +157,7 @@ fn the_caller_sees_the_nodes_of_the_file() {
             std::array::from_fn(|_| numbers.next().unwrap())
         })
         .collect();
-    let mut positions = vec![0.0; 3 * s.particle_count()];
-    s.read_field(Field::InitialPosition, &mut positions)
-        .unwrap();
-    assert_eq!(positions, nodes.concat());
+    assert_eq!(field(&s, Field::InitialPosition), nodes.concat());
 }
 
 #[test]

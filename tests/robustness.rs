@@ -1,22 +1,11 @@
 //! What must stay whole when something goes wrong, and geometries that invite silent errors.
 #![allow(missing_docs)]
 
-use urlsph::{Code, Field, Quantity, Scene, Simulation, Snapshot};
+mod common;
 
-const BLOCK: &str = r#"{
-    "geometry": {"box": {"min": [0, 0, 0], "max": [1, 2, 1], "spacing": 0.25}},
-    "material": {"neo_hookean": {"density": 1000, "youngs_modulus": 1e6, "poisson_ratio": 0.3}},
-    "time": {"end": 1}
-}"#;
+use urlsph::{Code, Field, Quantity, Snapshot};
 
-fn try_block(overrides: &[&str]) -> urlsph::Result<Simulation> {
-    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_string()).collect();
-    Simulation::with_threads(Scene::from_json(BLOCK, &overrides)?, 1)
-}
-
-fn block(overrides: &[&str]) -> Simulation {
-    try_block(overrides).expect("a good scene")
-}
+use common::{BLOCK, block, field, refuses};
 
 /// Two boxes around a slit one spacing wide, joined at the foot.
 const FORK: &str = r#"geometry={"boxes": {
@@ -31,12 +20,8 @@ fn neighbours_do_not_reach_across_a_gap() {
     // The legs moved apart: with bonds across the slit the forces would not be zero.
     let pull = r#"initial.displacement=["0.01*heaviside(X-1.25)*heaviside(Y-1.75)", 0, 0]"#;
     let moved = block(&[FORK, r#"numerics.neighbours={"radius": 2.1}"#, pull]);
-    let mut x = vec![0.0; 3 * moved.particle_count()];
-    moved.read_field(Field::InitialPosition, &mut x).expect("x");
-    let mut force = x.clone();
-    moved
-        .read_field(Field::NodalForce, &mut force)
-        .expect("force");
+    let x = field(&moved, Field::InitialPosition);
+    let force = field(&moved, Field::NodalForce);
     let mut tips = 0;
     for i in 0..moved.particle_count() {
         // Out of the reach of the moved layer's lower end.
@@ -69,25 +54,18 @@ fn faces_of_overlapping_boxes_are_whole() {
             let area: f64 = s.patches()[patch].areas.iter().sum();
             assert!((area - 2.0).abs() < 1e-12, "{name}: {area}");
         }
-        let volume: f64 = {
-            let mut v = vec![0.0; s.particle_count()];
-            s.read_field(Field::InitialVolume, &mut v).expect("volume");
-            v.iter().sum()
-        };
+        let volume: f64 = field(&s, Field::InitialVolume).iter().sum();
         assert!((volume - 3.0).abs() < 1e-12);
     }
 }
 
 #[test]
 fn a_jump_of_the_spacing_is_refused() {
-    let error = try_block(&[r#"geometry={"boxes": {
+    let jump = r#"geometry={"boxes": {
         "a": {"min": [0, 0, 0], "max": [2, 1, 1], "spacing": 0.5},
         "b": {"min": [2, 0, 0], "max": [4, 1, 1], "spacing": 0.25}
-    }}"#])
-    .expect_err("closure fails at the jump");
-    println!("{error}");
-    assert_eq!(error.place().path.as_deref(), Some("geometry.boxes"));
-    assert!(error.to_string().contains("along x"));
+    }}"#;
+    refuses(BLOCK, &[jump], "geometry.boxes", "along x");
 }
 
 /// A spacing that differs per axis is no jump.
@@ -202,9 +180,7 @@ fn a_breakdown_keeps_the_reference() {
         assert_eq!(s.state_hash(), last.hash());
         s.set_input(top, Quantity::Traction, &[0.0; 3])
             .expect("finite");
-        let mut j = vec![0.0; s.particle_count()];
-        s.read_field(Field::Jacobian, &mut j).expect("jacobian");
-        assert!(j.iter().all(|j| *j > 0.0));
+        assert!(field(&s, Field::Jacobian).iter().all(|j| *j > 0.0));
     }
 }
 

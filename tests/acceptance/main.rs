@@ -4,6 +4,8 @@
 
 mod cable;
 mod columns;
+#[path = "../common/mod.rs"]
+mod common;
 mod conservation;
 mod elastic_cube;
 mod heat;

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix4, Vector4};
 use urlsph::{Field, Scene, Simulation};
 
+pub use crate::common::field;
+
 /// A model of the columns: name and lattice spacing [m].
 #[derive(Debug, Clone, Copy)]
 pub struct Model(pub &'static str, pub f64);
@@ -61,15 +63,6 @@ pub fn run(simulation: &mut Simulation, end: f64, mut after: impl FnMut(&Simulat
             .unwrap_or_else(|e| panic!("{}: {e}", simulation.scene().title));
         after(simulation);
     }
-}
-
-/// A field of all particles.
-pub fn field(simulation: &Simulation, field: Field) -> Vec<f64> {
-    let mut values = vec![0.0; simulation.particle_count() * field.info().components];
-    simulation
-        .read_field(field, &mut values)
-        .expect("the buffer fits");
-    values
 }
 
 /// Displacement of a probe by name.
