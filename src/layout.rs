@@ -40,11 +40,12 @@ impl Layout {
     }
     /// First slot and number of slices of a slab.
     pub fn slab_range(&self, index: usize) -> (usize, usize) {
-        let first = index * self.slab;
-        (
-            Self::FIRST + first * SLICE,
-            self.slab.min(self.slices - first),
-        )
+        self.piece_range(index, self.slab)
+    }
+    /// The same of a piece of another number of slices.
+    pub fn piece_range(&self, index: usize, each: usize) -> (usize, usize) {
+        let first = index * each;
+        (Self::FIRST + first * SLICE, each.min(self.slices - first))
     }
     /// Slices from one component to the next. A distance that is a multiple of 4 kB would map all
     /// components of a particle to the same cache set.
@@ -130,16 +131,20 @@ impl<const N: usize> Array<N> {
     }
     /// One piece per slab, by components, without the guards: slot `FIRST + i` of slab 0 is index `i`.
     pub fn slabs_mut(&mut self) -> Vec<[&mut [f64]; N]> {
-        let Layout { slices, slab, .. } = self.layout;
+        self.pieces_mut(self.layout.slab)
+    }
+    /// The same in pieces of another number of slices.
+    pub fn pieces_mut(&mut self, each: usize) -> Vec<[&mut [f64]; N]> {
+        let Layout { slices, .. } = self.layout;
         let stride = self.layout.stride();
         let mut pieces: [_; N] = {
             let mut components = self.data.chunks_exact_mut(stride);
             std::array::from_fn(|_| {
                 let component = components.next().expect("N components");
-                component[1..=slices].chunks_mut(slab)
+                component[1..=slices].chunks_mut(each)
             })
         };
-        (0..self.layout.slabs())
+        (0..slices.div_ceil(each))
             .map(|_| {
                 std::array::from_fn(|c| {
                     bytemuck::must_cast_slice_mut(

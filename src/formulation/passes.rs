@@ -78,7 +78,12 @@ pub(super) fn lanes_of<T: Lane>(
     reference: &Reference,
     slab: usize,
 ) -> impl Iterator<Item = (usize, usize)> {
-    let (first, slices) = reference.layout.slab_range(slab);
+    lanes_from::<T>(reference.layout.slab_range(slab))
+}
+
+/// The same of any piece.
+#[inline(always)]
+fn lanes_from<T: Lane>((first, slices): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
     std::iter::zip(
         (0..slices * SLICE).step_by(T::WIDTH),
         (first..).step_by(T::WIDTH),
@@ -471,7 +476,10 @@ impl<T: Lane> Areas<T> {
     }
 }
 
-/// T_a (57); (power of the dissipation, smallest squared |x_ab| lambda_ab) of the slab.
+/// T_a (57) of the particles of one piece, from the pairs whose first particle lies in it; (power of the
+/// dissipation, smallest squared |x_ab| lambda_ab) of these pairs.
+///
+/// Each pair is computed once, for both of its particles: what it does to the second is taken off there.
 pub(super) struct Forces<'a, P, const MODE: u8> {
     pub pairs: P,
     pub input: ForceInput<'a>,
@@ -480,10 +488,11 @@ pub(super) struct Forces<'a, P, const MODE: u8> {
     pub coefficient: f64,
     /// What makes up for that share in a shock, 0 without a limiter of shocks.
     pub shock: f64,
-    /// rho_R [kg/m^3].
-    pub density: f64,
-    pub slab: usize,
+    /// First slot and number of slices.
+    pub piece: (usize, usize),
     pub out: [&'a mut [f64]; 3],
+    /// The same for the particles behind the piece.
+    pub behind: [&'a mut [f64]; 3],
 }
 
 impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
@@ -496,12 +505,12 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             speeds,
             coefficient,
             shock,
-            density,
-            slab,
+            piece,
             mut out,
+            mut behind,
         } = self;
         let slices = &input.reference.slices;
-        let (weights, volume) = (slices.weights(), input.reference.volume.components()[0]);
+        let weights = slices.weights();
         let speeds = WaveSpeeds {
             pressure: T::splat(token, coefficient * speeds.pressure),
             shear: T::splat(token, coefficient * speeds.shear),
@@ -509,12 +518,15 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
         let full = T::splat(token, shock);
         let far = T::splat(token, f64::INFINITY);
         let (mut power, mut shortest) = (PerSlot::new(0.0), PerSlot::new(f64::INFINITY));
-        for (at, a) in lanes_of::<T>(input.reference, slab) {
+        for values in out.iter_mut().chain(&mut behind) {
+            values.fill(0.0);
+        }
+        for (at, a) in lanes_from::<T>(piece) {
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
             let qa = load9::<T>(token, &input.q, a);
             let (mut sa, mut grad_a) = ([zero3(token); 3], [zero3(token); 3]);
-            if MODE != riemann::OFF || P::BOUND_BY_AREAS {
+            if MODE != riemann::OFF {
                 sa = input.area::<T>(token, a);
             }
             if riemann::reconstructs(MODE) {
@@ -522,21 +534,15 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             }
             let mut force = zero3::<T>(token);
             let mut work = T::splat(token, 0.0);
-            let mut areas = Areas::new(token);
             let mut length2 = far;
-            for (b, pair) in slices.of(a) {
+            for (b, pair) in slices.after(a) {
                 let (g, back) = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
                 let mask = T::load(token, weights, pair);
                 length2 = length2.min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
                 let mut f = sub3(mat_vec(&qa, g), mat_vec(&load9(token, &input.q, b), back));
-                if MODE != riemann::OFF || P::BOUND_BY_AREAS {
-                    p.area = input.pair_area(&sa, b, (g, back));
-                }
-                if P::BOUND_BY_AREAS {
-                    areas.add(p.area);
-                }
                 if MODE != riemann::OFF {
+                    p.area = input.pair_area(&sa, b, (g, back));
                     let grad_b = if riemann::reconstructs(MODE) {
                         load9(token, &input.half_grad, b)
                     } else {
@@ -551,18 +557,75 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                     f = add3(f, d);
                 }
                 force = add3(force, f);
+                take_off(f, &mut out, &mut behind, at + (b - a));
             }
-            store3(&force, &mut out, at);
+            // Only now: a pair within the lanes has changed what stands here.
+            store3(&add3(load_slab3(token, &out, at), force), &mut out, at);
             power.add(at, work);
-            if P::BOUND_BY_AREAS {
-                let mass = T::splat(token, density) * T::load(token, volume, a);
-                let bound = areas.length(here.stretch * mass / here.density);
-                length2 = bound.if_positive(length2.min(bound * bound), length2);
-            }
             shortest.min(at, length2);
         }
-        // Each pair is seen from both sides.
-        (0.5 * power.sum(), shortest.least())
+        (power.sum(), shortest.least())
+    }
+}
+
+/// Takes a vector off what stands at a place of a piece, or behind its end.
+#[inline(always)]
+fn take_off<T: Lane>(
+    value: Vec3<T>,
+    piece: &mut [&mut [f64]; 3],
+    behind: &mut [&mut [f64]; 3],
+    at: usize,
+) {
+    let end = piece[0].len();
+    let token = value[0].token();
+    let within = |to: &mut [&mut [f64]; 3], at: usize| {
+        store3(&sub3(load_slab3(token, to, at), value), to, at);
+    };
+    if at + T::WIDTH <= end {
+        within(piece, at);
+    } else if at >= end {
+        within(behind, at - end);
+    } else {
+        for c in 0..3 {
+            value[c].for_lanes(|lane, v| match (at + lane).checked_sub(end) {
+                None => piece[c][at + lane] -= v,
+                Some(at) => behind[c][at] -= v,
+            });
+        }
+    }
+}
+
+/// Smallest squared length that the areas of the pairs allow the particles of one slab.
+pub(super) struct AreaLengths<'a, P> {
+    pub pairs: P,
+    pub input: ForceInput<'a>,
+    /// rho_R [kg/m^3].
+    pub density: f64,
+    pub slab: usize,
+}
+
+impl<P: PairVectors> Work for AreaLengths<'_, P> {
+    type Output = f64;
+    #[inline(always)]
+    fn run<T: Lane>(self, token: T::Token) -> f64 {
+        let Self { pairs, input, .. } = self;
+        let volume = input.reference.volume.components()[0];
+        let density = T::splat(token, self.density);
+        let far = T::splat(token, f64::INFINITY);
+        let mut shortest = PerSlot::new(f64::INFINITY);
+        for (at, a) in lanes_of::<T>(input.reference, self.slab) {
+            let here = input.here::<T>(token, a);
+            let centre = pairs.centre::<T>(token, a);
+            let sa = input.area::<T>(token, a);
+            let mut areas = Areas::new(token);
+            for (b, pair) in input.reference.slices.of(a) {
+                areas.add(input.pair_area(&sa, b, pairs.pair(token, &centre, b, pair)));
+            }
+            let mass = density * T::load(token, volume, a);
+            let bound = areas.length(here.stretch * mass / here.density);
+            shortest.min(at, bound.if_positive(bound * bound, far));
+        }
+        shortest.least()
     }
 }
 

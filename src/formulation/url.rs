@@ -13,11 +13,11 @@ use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
 use super::laws::{LawInputs, Stored, inadmissible, stresses};
 use super::passes::{
-    Bound, BoundSlope, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit, Motion,
-    PointOutput, Points, VolumeRates, immovable, spacings,
+    AreaLengths, Bound, BoundSlope, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit,
+    Motion, PointOutput, Points, VolumeRates, immovable, spacings,
 };
 use super::riemann::{self, WaveSpeeds};
-use crate::lane::{Lane, SLICE, Work, vectorised};
+use crate::lane::{Lane, SLICE, Slots, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::material::{Deformation, History, Law, Material, Point, Thermal, VIRGIN, with_law};
 use crate::math::*;
@@ -75,6 +75,38 @@ pub(super) struct Scratch {
     sigma_j: Option<(Array<1>, Array<3>)>,
     /// Temperature [K] and conduction variable; only of a body with heat.
     pub theta: Option<Array<2>>,
+}
+
+/// What the pairs of the force pass do across the ends of its pieces.
+#[derive(Debug)]
+struct Across {
+    /// Slices of a piece: at least the reach.
+    each: usize,
+    /// Slices behind a piece that its pairs reach, at most.
+    reach: usize,
+    /// Force [N] on the particles behind each piece: components, one after the other.
+    force: Vec<Slots>,
+}
+
+impl Across {
+    fn new(reference: &Reference) -> Self {
+        let layout = reference.layout;
+        let reach = reference.slices.reach();
+        let each = reach.max(layout.slab);
+        let pieces = layout.slices.div_ceil(each);
+        Self {
+            each,
+            reach,
+            force: vec![Slots([0.0; SLICE]); pieces * 3 * reach],
+        }
+    }
+}
+
+/// The three components that follow each other.
+fn split3(all: &mut [Slots]) -> [&mut [f64]; 3] {
+    let (x, rest) = all.split_at_mut(all.len() / 3);
+    let (y, z) = rest.split_at_mut(x.len());
+    [x, y, z].map(bytemuck::must_cast_slice_mut)
 }
 
 /// Sums over the body and what an evaluation found, in a fixed order.
@@ -150,6 +182,7 @@ pub struct Url {
     law: Law,
     pub(super) options: Options,
     pub(super) scratch: Scratch,
+    across: Across,
     conduction: Option<Conduction>,
     /// Spacing tensors [m^-2], initial; only of a law that flows, with kernels on a lattice. Elsewhere
     /// the stretch of the law or the areas of the pairs see to the same.
@@ -253,6 +286,7 @@ impl Url {
                 sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
                 theta: thermal.map(|_| Array::new(layout, [1.0; 2])),
             },
+            across: Across::new(reference),
             conduction: conduction.map(|thermal| Conduction::new(layout, thermal)),
             spacing: (law.has_history() && !bound).then(|| spacings(reference)),
             rates: Rates {
@@ -348,6 +382,10 @@ impl Url {
         for (dissipation, length2) in self.forces::<R>(state, reference, mode) {
             total.dissipation += dissipation;
             total.length = total.length.min(length2);
+        }
+        // Only the last evaluation of a step bounds the next one.
+        if elapsed.is_none() && reference.is_bound_by_areas() {
+            total.length = total.length.min(self.area_length2::<R>(state, reference));
         }
         total.length = total.length.sqrt();
         // The linear reconstruction of a pair may pass the jump, and such a pair gains a little of what
@@ -470,18 +508,19 @@ impl Url {
         self.scratch.half_grad = Some(half_grad);
     }
 
-    /// Force pass; power of the dissipation and squared length by slab.
+    /// Force pass; power of the dissipation and squared length by piece.
     fn forces<R: Runner>(
         &mut self,
         state: &State,
         reference: &Reference,
         mode: u8,
     ) -> Vec<(f64, f64)> {
-        let (speeds, density) = (self.wave_speeds(), self.law.density());
+        let speeds = self.wave_speeds();
         let Self {
             options,
             scratch,
             rates,
+            across,
             ..
         } = self;
         let coefficient = options.coefficient;
@@ -490,12 +529,17 @@ impl Url {
             _ => 0.0,
         };
         let input = ForceInput::new(state, reference, scratch);
-        parallel::map_slabs(rates.force.slabs_mut(), |slab, out| {
+        let Across { each, reach, force } = across;
+        let pieces = rates.force.pieces_mut(*each).into_iter();
+        let pieces = pieces.zip(force.chunks_mut(3 * *reach)).collect();
+        let found = parallel::map_slabs(pieces, |index, (out, behind)| {
+            let piece = reference.layout.piece_range(index, *each);
+            let behind = split3(behind);
             macro_rules! forces {
                 ($pairs:expr, $($mode:ident),*) => {
                     match mode {
                         $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
-                            pairs: $pairs, input, speeds, coefficient, shock, density, slab, out,
+                            pairs: $pairs, input, speeds, coefficient, shock, piece, out, behind,
                         }),)*
                         _ => unreachable!("six modes"),
                     }
@@ -504,7 +548,28 @@ impl Url {
             with_pairs!(reference, pairs => forces!(
                 pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF, GUARDED
             ))
-        })
+        });
+        // A piece is no shorter than the reach: what lies behind it is in the next one.
+        let pieces = rates.force.pieces_mut(*each).into_iter().skip(1);
+        let pieces = pieces.zip(force.chunks_mut(3 * *reach)).collect();
+        parallel::map_slabs(pieces, |_, (out, before)| {
+            for (out, before) in out.into_iter().zip(split3(before)) {
+                out.iter_mut().zip(before).for_each(|(f, b)| *f += *b);
+            }
+        });
+        found
+    }
+
+    /// Smallest squared length that the areas of the pairs allow.
+    fn area_length2<R: Runner>(&self, state: &State, reference: &Reference) -> f64 {
+        let input = ForceInput::new(state, reference, &self.scratch);
+        let density = self.law.density();
+        let slabs = vec![(); reference.layout.slabs()];
+        let found = parallel::map_slabs(
+            slabs,
+            |slab, ()| with_pairs!(reference, pairs => R::run(AreaLengths { pairs, input, density, slab })),
+        );
+        found.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// dj/dt by D^j; returns the power that it dissipates.
@@ -744,6 +809,7 @@ impl Url {
             + self.rates.heat.as_ref().map_or(0, Array::bytes)
             + self.conduction.as_ref().map_or(0, Conduction::bytes)
             + self.spacing.as_ref().map_or(0, Array::bytes)
+            + std::mem::size_of_val(&self.across.force[..])
     }
 }
 

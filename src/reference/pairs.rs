@@ -8,8 +8,6 @@ use crate::math::*;
 
 /// Pair vectors g_ab and g_ba of a pair.
 pub trait PairVectors: Copy + Sync {
-    /// Whether the step follows from the areas of the pairs too, not from their distances alone.
-    const BOUND_BY_AREAS: bool = true;
     /// What is read once per particle.
     type Centre<T: Lane>: Copy;
     /// Reads it.
@@ -32,8 +30,6 @@ pub struct Lean<'a> {
 }
 
 impl PairVectors for Lean<'_> {
-    /// On a lattice the shortest distance is the stricter bound.
-    const BOUND_BY_AREAS: bool = false;
     type Centre<T: Lane> = Vec3<T>;
     #[inline(always)]
     fn centre<T: Lane>(&self, token: T::Token, a: usize) -> Vec3<T> {

@@ -12,6 +12,8 @@ use crate::neighbours::Graph;
 pub struct Slices {
     /// First entry of each slice.
     start: Vec<usize>,
+    /// First entry of each slice whose neighbours come after the particles.
+    after: Vec<usize>,
     /// Slot of the neighbour of the slice's first lane.
     base: Vec<u32>,
     /// k of the initial configuration per lane; 0 where a lane has no neighbour in this entry.
@@ -31,6 +33,31 @@ impl Slices {
             lane,
         }
     }
+    /// The same for neighbours that come after the particles, the most distant first: each pair
+    /// of the body once.
+    ///
+    /// In this order what the pairs do to a particle comes from the others in their order, however
+    /// many lanes run side by side.
+    #[inline(always)]
+    pub fn after(&self, a: usize) -> impl Iterator<Item = (usize, usize)> {
+        let (slice, lane) = ((a - Layout::FIRST) / SLICE, (a - Layout::FIRST) % SLICE);
+        let entries = self.after[slice]..self.start[slice + 1];
+        let bases = self.base[entries.clone()].iter();
+        std::iter::zip(bases, entries)
+            .rev()
+            .map(move |(base, entry)| (*base as usize + lane, entry * SLICE + lane))
+    }
+    /// Slices behind a slice that its neighbours lie in, at most.
+    pub fn reach(&self) -> usize {
+        let farthest = |slice: usize| match self.start[slice + 1] {
+            end if end > self.after[slice] => {
+                self.base[end - 1] as usize - (Layout::FIRST + slice * SLICE)
+            }
+            _ => 0,
+        };
+        let farthest = (0..self.after.len()).map(farthest).max().unwrap_or(0);
+        farthest.div_ceil(SLICE)
+    }
     /// Weights by pair index.
     #[inline(always)]
     pub fn weights(&self) -> &[f64] {
@@ -41,6 +68,7 @@ impl Slices {
     pub(super) fn new(graph: &Graph, layout: Layout) -> Self {
         let mut this = Self {
             start: vec![0],
+            after: Vec::new(),
             base: Vec::new(),
             weight: Vec::new(),
         };
@@ -54,6 +82,8 @@ impl Slices {
             }
             offsets.sort_unstable();
             offsets.dedup();
+            let before = offsets.partition_point(|o| *o < 0);
+            this.after.push(this.base.len() + before);
             // A lane of the slice has a neighbour at each offset, so the base is at most 7 slots
             // before the first particle: inside the guard.
             this.base.extend(
@@ -107,6 +137,7 @@ impl Slices {
         std::mem::size_of_val(&self.weight[..])
             + std::mem::size_of_val(&self.base[..])
             + std::mem::size_of_val(&self.start[..])
+            + std::mem::size_of_val(&self.after[..])
     }
 
     /// Pair index of two neighbours.
