@@ -168,6 +168,19 @@ impl<const N: usize> Array<N> {
     }
 }
 
+/// Components cut to a length that they have: in a loop that begins with it, one check of an index
+/// serves them all.
+#[inline(always)]
+pub fn level<const N: usize>(mut components: [&[f64]; N], length: usize) -> [&[f64]; N] {
+    // Not by `map`, which the compiler does not see through.
+    let mut c = 0;
+    while c < N {
+        components[c] = &components[c][..length];
+        c += 1;
+    }
+    components
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

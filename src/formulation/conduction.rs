@@ -15,6 +15,7 @@
 //! produces sum_a v k theta^2 |grad beta|^2 + sum_ab s_ab^2/(2 K_ab). It vanishes for a linear beta.
 
 use super::passes::{ForceInput, HalfSlope, Kinematics, lanes_of};
+use super::riemann;
 use super::url::Runner;
 use crate::lane::{Lane, PerSlot, Work};
 use crate::layout::{Array, Layout};
@@ -112,12 +113,8 @@ impl<P: PairVectors> Work for Jumps<'_, P> {
     type Output = (f64, f64);
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) -> (f64, f64) {
-        let Self {
-            pairs,
-            input,
-            thermal,
-            ..
-        } = self;
+        let (input, pairs) = self.input.level::<P, { riemann::CONSTANT }>(self.pairs);
+        let thermal = self.thermal;
         let slices = &input.reference.slices;
         let weights = slices.weights();
         let volume = input.reference.volume.components()[0];

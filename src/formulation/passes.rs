@@ -4,7 +4,7 @@ use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
 use super::url::{Breakdown, Scratch, State, Trouble};
 use crate::lane::{Lane, PerSlot, SLICE, Work};
-use crate::layout::{Array, Layout};
+use crate::layout::{Array, Layout, level};
 use crate::material::Deformation;
 use crate::math::*;
 use crate::parallel;
@@ -104,13 +104,15 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
         let l = self.reference.l.components();
+        let slots = l[0].len();
+        let (pairs, field) = (self.pairs.level(slots), level(self.field, slots));
         for (at, a) in lanes_of::<T>(self.reference, self.slab) {
-            let centre = self.pairs.centre::<T>(token, a);
-            let own = load3::<T>(token, &self.field, a);
+            let centre = pairs.centre::<T>(token, a);
+            let own = load3::<T>(token, &field, a);
             let mut sum = [zero3(token); 3];
             for (b, pair) in self.reference.slices.of(a) {
-                let (g, _) = self.pairs.pair(token, &centre, b, pair);
-                sum = add_outer(&sum, sub3(load3(token, &self.field, b), own), g);
+                let (g, _) = pairs.pair(token, &centre, b, pair);
+                sum = add_outer(&sum, sub3(load3(token, &field, b), own), g);
             }
             store9(&mat_mul_t(&sum, &load9(token, &l, a)), self.out, at);
         }
@@ -370,6 +372,27 @@ impl<'a> ForceInput<'a> {
         }
     }
 
+    /// The same, and pair vectors, made to show that what a mode reads holds as many slots: one check of
+    /// an index serves them all.
+    #[inline(always)]
+    pub(super) fn level<P: PairVectors, const MODE: u8>(self, pairs: P) -> (Self, P) {
+        let slots = self.x[0].len();
+        let mut this = Self {
+            x: level(self.x, slots),
+            v: level(self.v, slots),
+            q: level(self.q, slots),
+            wave: level(self.wave, slots),
+            ..self
+        };
+        if MODE != riemann::OFF {
+            this.s = level(self.s, slots);
+        }
+        if riemann::reconstructs(MODE) {
+            this.half_grad = level(self.half_grad, slots);
+        }
+        (this, pairs.level(slots))
+    }
+
     /// x_a.
     #[inline(always)]
     pub(super) fn position<T: Lane>(&self, token: T::Token, a: usize) -> Vec3<T> {
@@ -402,6 +425,30 @@ impl<'a> ForceInput<'a> {
             stretch: T::load(token, self.wave[0], a),
             density: T::load(token, self.wave[1], a),
         }
+    }
+
+    /// T_a (57) of one particle from all of its neighbours: what the force pass gives, without its order.
+    #[cfg(test)]
+    pub(super) fn force_on<P: PairVectors>(
+        &self,
+        pairs: P,
+        speeds: WaveSpeeds<f64>,
+        a: usize,
+    ) -> Vec3<f64> {
+        let (here, centre) = (self.here((), a), pairs.centre::<f64>((), a));
+        let (qa, sa) = (load9((), &self.q, a), self.area((), a));
+        let grad_a = load9((), &self.half_grad, a);
+        let mut force = [0.0; 3];
+        for (b, pair) in self.reference.slices.of(a) {
+            let (g, back) = pairs.pair((), &centre, b, pair);
+            let mut p = self.pair(&here, b);
+            p.area = self.pair_area(&sa, b, (g, back));
+            let grad_b = load9((), &self.half_grad, b);
+            let jump = riemann::jump::<f64, { riemann::LINEAR }>(&p, &grad_a, &grad_b, 0.0);
+            let stress = sub3(mat_vec(&qa, g), mat_vec(&load9((), &self.q, b), back));
+            force = add3(force, add3(stress, riemann::dissipation(&p, jump, speeds)));
+        }
+        force
     }
 
     /// The pair a, b as the Riemann solver sees it, but for its area.
@@ -509,6 +556,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             mut out,
             mut behind,
         } = self;
+        let (input, pairs) = input.level::<P, MODE>(pairs);
         let slices = &input.reference.slices;
         let weights = slices.weights();
         let speeds = WaveSpeeds {
@@ -608,7 +656,7 @@ impl<P: PairVectors> Work for AreaLengths<'_, P> {
     type Output = f64;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> f64 {
-        let Self { pairs, input, .. } = self;
+        let (input, pairs) = self.input.level::<P, { riemann::CONSTANT }>(self.pairs);
         let volume = input.reference.volume.components()[0];
         let density = T::splat(token, self.density);
         let far = T::splat(token, f64::INFINITY);
@@ -669,16 +717,17 @@ impl<P: PairVectors> Work for Bound<'_, P> {
             shear: T::splat(token, self.speeds.shear),
         };
         let zero = T::splat(token, 0.0);
-        for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
-            let here = self.input.here::<T>(token, a);
-            let centre = self.pairs.centre::<T>(token, a);
-            let sa = self.input.area::<T>(token, a);
+        let (input, pairs) = self.input.level::<P, { riemann::CONSTANT }>(self.pairs);
+        for (at, a) in lanes_of::<T>(input.reference, self.slab) {
+            let here = input.here::<T>(token, a);
+            let centre = pairs.centre::<T>(token, a);
+            let sa = input.area::<T>(token, a);
             let half = load_slab9::<T>(token, &self.half_grad, at);
             let (mut jumps, mut half_steps) = (zero, zero);
-            for (b, pair) in self.input.reference.slices.of(a) {
-                let vectors = self.pairs.pair(token, &centre, b, pair);
-                let mut p = self.input.pair(&here, b);
-                p.area = self.input.pair_area(&sa, b, vectors);
+            for (b, pair) in input.reference.slices.of(a) {
+                let vectors = pairs.pair(token, &centre, b, pair);
+                let mut p = input.pair(&here, b);
+                p.area = input.pair_area(&sa, b, vectors);
                 let d = riemann::dissipation(&p, p.dv, speeds);
                 jumps = jumps + dot(d, p.dv);
                 half_steps = half_steps + dot(d, mat_vec(&half, p.dx));
@@ -704,13 +753,15 @@ impl<P: PairVectors> Work for HalfSlope<'_, P> {
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) {
         let l = self.reference.l.components();
+        let slots = l[0].len();
+        let (pairs, field) = (self.pairs.level(slots), &self.field[..slots]);
         for (at, a) in lanes_of::<T>(self.reference, self.slab) {
-            let centre = self.pairs.centre::<T>(token, a);
-            let own = T::load(token, self.field, a);
+            let centre = pairs.centre::<T>(token, a);
+            let own = T::load(token, field, a);
             let mut sum = zero3(token);
             for (b, pair) in self.reference.slices.of(a) {
-                let (g, _) = self.pairs.pair(token, &centre, b, pair);
-                sum = axpy3(sum, T::load(token, self.field, b) - own, g);
+                let (g, _) = pairs.pair(token, &centre, b, pair);
+                sum = axpy3(sum, T::load(token, field, b) - own, g);
             }
             let f = load9::<T>(token, &self.kinematics.f, a);
             let cof = cofactor(&f);
@@ -737,17 +788,18 @@ impl<P: PairVectors> Work for BoundSlope<'_, P> {
     fn run<T: Lane>(mut self, token: T::Token) {
         let [zero, one] = [0.0, 1.0].map(|v| T::splat(token, v));
         let speed = T::splat(token, self.pressure_speed);
-        for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
-            let here = self.input.here::<T>(token, a);
-            let centre = self.pairs.centre::<T>(token, a);
-            let sa = self.input.area::<T>(token, a);
+        let (input, pairs) = self.input.level::<P, { riemann::CONSTANT }>(self.pairs);
+        for (at, a) in lanes_of::<T>(input.reference, self.slab) {
+            let here = input.here::<T>(token, a);
+            let centre = pairs.centre::<T>(token, a);
+            let sa = input.area::<T>(token, a);
             let sigma_a = T::load(token, self.sigma, a);
             let half: Vec3<T> = std::array::from_fn(|c| T::load(token, self.half_slope[c], at));
             let (mut jumps, mut half_steps) = (zero, zero);
-            for (b, pair) in self.input.reference.slices.of(a) {
-                let vectors = self.pairs.pair(token, &centre, b, pair);
-                let mut p = self.input.pair(&here, b);
-                p.area = self.input.pair_area(&sa, b, vectors);
+            for (b, pair) in input.reference.slices.of(a) {
+                let vectors = pairs.pair(token, &centre, b, pair);
+                let mut p = input.pair(&here, b);
+                p.area = input.pair_area(&sa, b, vectors);
                 let difference = T::load(token, self.sigma, b) - sigma_a;
                 let d = riemann::volume_dissipation(&p, difference, speed, one);
                 jumps = d.mul_add(difference, jumps);
@@ -776,7 +828,7 @@ impl<P: PairVectors> Work for VolumeRates<'_, P> {
     type Output = f64;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> f64 {
-        let Self { pairs, input, .. } = self;
+        let (input, pairs) = self.input.level::<P, { riemann::CONSTANT }>(self.pairs);
         let volume = input.reference.volume.components()[0];
         let (speed, coefficient) = (
             T::splat(token, self.pressure_speed),

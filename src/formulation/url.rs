@@ -991,6 +991,40 @@ mod tests {
         }
     }
 
+    /// Each pair once, in pieces, gives the sums over all neighbours.
+    #[test]
+    fn the_force_pass_gives_the_sums_over_all_neighbours() {
+        let options: &[&[&str]] = &[
+            &[],
+            &["numerics.neighbours=26", "numerics.weights=tributary"],
+            &["numerics.operators=repaired"],
+            &[
+                "numerics.kernel_option=4",
+                "numerics.reference_update=every_step",
+            ],
+        ];
+        for overrides in options {
+            let (reference, state, mut url) = body(overrides);
+            url.evaluate(&state, &reference, None)
+                .expect("a good state");
+            let pieces = reference.layout.slices.div_ceil(url.across.each);
+            let input = ForceInput::new(&state, &reference, &url.scratch);
+            let speeds = url.wave_speeds();
+            let (mut error, mut largest) = (0.0_f64, 0.0_f64);
+            for a in (0..reference.layout.particles).map(Layout::slot) {
+                let force = with_pairs!(reference, pairs => input.force_on(pairs, speeds, a));
+                let rest = sub3(url.rates.force.get(a), force);
+                error = error.max(dot(rest, rest).sqrt());
+                largest = largest.max(dot(force, force).sqrt());
+            }
+            println!(
+                "{overrides:?}: {:.1e} (1e-13), {pieces} pieces",
+                error / largest
+            );
+            assert!(error < 1e-13 * largest && pieces > 1);
+        }
+    }
+
     /// The gradient of a linear field is exact, and a uniform stress leaves inner particles alone
     /// and gives each particle of a face its tributary area times the traction.
     #[test]

@@ -4,10 +4,13 @@ use super::slices::Slices;
 use super::{load3, load9};
 use crate::lane::{Lane, SLICE, Slots};
 use crate::layout::Layout;
+use crate::layout::level;
 use crate::math::*;
 
 /// Pair vectors g_ab and g_ba of a pair.
 pub trait PairVectors: Copy + Sync {
+    /// The same, made to show that all of its arrays hold as many slots: one check serves them all.
+    fn level(self, slots: usize) -> Self;
     /// What is read once per particle.
     type Centre<T: Lane>: Copy;
     /// Reads it.
@@ -30,6 +33,13 @@ pub struct Lean<'a> {
 }
 
 impl PairVectors for Lean<'_> {
+    #[inline(always)]
+    fn level(self, slots: usize) -> Self {
+        Self {
+            x: level(self.x, slots),
+            ..self
+        }
+    }
     type Centre<T: Lane> = Vec3<T>;
     #[inline(always)]
     fn centre<T: Lane>(&self, token: T::Token, a: usize) -> Vec3<T> {
@@ -64,6 +74,15 @@ pub struct Closed<'a> {
 }
 
 impl PairVectors for Closed<'_> {
+    #[inline(always)]
+    fn level(self, slots: usize) -> Self {
+        Self {
+            x: level(self.x, slots),
+            half_mu: level(self.half_mu, slots),
+            lambda: level(self.lambda, slots),
+            ..self
+        }
+    }
     type Centre<T: Lane> = (Vec3<T>, Vec3<T>, Mat3<T>);
     #[inline(always)]
     fn centre<T: Lane>(&self, token: T::Token, a: usize) -> Self::Centre<T> {
@@ -98,6 +117,14 @@ pub struct Stored<'a> {
 }
 
 impl PairVectors for Stored<'_> {
+    #[inline(always)]
+    fn level(self, _: usize) -> Self {
+        let pairs = self.ab[0].len();
+        Self {
+            ab: level(self.ab, pairs),
+            ba: level(self.ba, pairs),
+        }
+    }
     type Centre<T: Lane> = ();
     #[inline(always)]
     fn centre<T: Lane>(&self, _: T::Token, _: usize) {}
