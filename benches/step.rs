@@ -1,10 +1,13 @@
 //! One right-hand side and one time step: time per directed neighbour pair (`Throughput::Elements`).
 //!
-//! A column of 17 x 97 x 17 particles at the start of a twist. `cargo bench --bench step`.
+//! A column at the start of a twist: 17 x 97 x 17 particles, or 9 x 49 x 9. `cargo bench --bench step`.
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::measurement::WallTime;
+use criterion::{
+    BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main,
+};
 use urlsph::{Scene, Simulation};
 
 const SCENE: &str = include_str!("../examples/column_twisting/scene.json");
@@ -39,10 +42,16 @@ fn column(spacing: f64, threads: usize, overrides: &[&str]) -> Simulation {
 
 fn right_hand_side(c: &mut Criterion) {
     let mut group = c.benchmark_group("right-hand side, 28,033 particles");
-    for threads in [1, 2] {
-        let mut simulation = column(0.0625, threads, &[]);
+    let cases: [(&str, &[&str]); 4] = [
+        ("elastic", &[]),
+        ("with heat", &[HEAT]),
+        ("von Mises", &[VON_MISES]),
+        ("Johnson-Cook with heat", &[JOHNSON_COOK, HEAT]),
+    ];
+    for ((name, overrides), threads) in cases.iter().flat_map(|c| [(c, 1), (c, 2)]) {
+        let mut simulation = column(0.0625, threads, overrides);
         group.throughput(Throughput::Elements(simulation.pair_count() as u64));
-        group.bench_function(BenchmarkId::new("threads", threads), |b| {
+        group.bench_function(BenchmarkId::new(*name, threads), |b| {
             b.iter(|| black_box(simulation.evaluate()));
         });
         println!(
@@ -123,24 +132,44 @@ fn options(c: &mut Criterion) {
     ];
     let mut group = c.benchmark_group("step, 3,969 particles, 1 thread");
     for (name, overrides) in cases {
-        let mut simulation = column(0.125, 1, overrides);
-        // Three right-hand sides a step.
-        group.throughput(Throughput::Elements(3 * simulation.pair_count() as u64));
-        let dt = 1e-3 * simulation.stable_step();
-        group.bench_function(*name, |b| {
-            b.iter(|| {
-                simulation
-                    .advance(simulation.time() + dt)
-                    .expect("a short step")
-            });
-        });
+        steps(
+            &mut group,
+            BenchmarkId::from_parameter(name),
+            column(0.125, 1, overrides),
+        );
     }
     group.finish();
+}
+
+/// Whole steps of a larger body.
+fn threads(c: &mut Criterion) {
+    let mut group = c.benchmark_group("step, 28,033 particles");
+    for threads in [1, 2] {
+        steps(
+            &mut group,
+            BenchmarkId::new("threads", threads),
+            column(0.0625, threads, &[]),
+        );
+    }
+    group.finish();
+}
+
+fn steps(group: &mut BenchmarkGroup<'_, WallTime>, id: BenchmarkId, mut simulation: Simulation) {
+    // Three right-hand sides a step.
+    group.throughput(Throughput::Elements(3 * simulation.pair_count() as u64));
+    let dt = 1e-3 * simulation.stable_step();
+    group.bench_function(id, |b| {
+        b.iter(|| {
+            simulation
+                .advance(simulation.time() + dt)
+                .expect("a short step")
+        });
+    });
 }
 
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = right_hand_side, options
+    targets = right_hand_side, threads, options
 }
 criterion_main!(benches);

@@ -56,8 +56,8 @@ pub(crate) fn bytes_per_particle(scene: &Scene, neighbours: f64) -> f64 {
         + when(operators == Operators::Repaired, 15.0)
         + when(plastic && operators == Operators::Kernel, 6.0)
         + when(updated && operators == Operators::Repaired, 3.0);
-    // Q, the wave speed's, forces, grad v; S and the half gradient.
-    let rates = 23.0
+    // Q, the wave speed's, forces, also across the ends of pieces, grad v; S and the half gradient.
+    let rates = 26.0
         + when(n.dissipation, 9.0)
         + when(
             n.dissipation && n.reconstruction != Reconstruction::None,

@@ -430,10 +430,11 @@ fn aluminium_bar_is_near_the_table() {
 }
 
 #[test]
-#[ignore = "three sizes: cargo xtask validate"]
+#[ignore = "two sizes: cargo xtask validate"]
 fn aluminium_bar_in_full() {
     println!("\n### aluminium_round_bar: at 60 us\n\n{ALUMINIUM}");
-    let found = [0, 1, 2].map(aluminium);
+    // The third row of the table takes sixteen times as long as the first.
+    let found = [0, 1].map(aluminium);
     println!();
     assert!(found.is_sorted_by(|a, b| a.radius < b.radius), "{found:?}");
 }
