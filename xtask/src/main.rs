@@ -6,6 +6,7 @@ mod fmu_tests;
 mod header;
 mod install;
 mod output_tests;
+mod peer;
 mod project;
 mod tally;
 mod test;
@@ -28,6 +29,8 @@ Tasks:
   header      Generate include/urlsph.h; with --check only see whether it is up to date
   install     --prefix DIR [--destdir DIR]: command line, library, headers, pkg-config and CMake
               files
+  peer        Time and errors beside LAMMPS' Smooth Mach Dynamics, one core each; the report is
+              target/peer/report.md. Options: benches/peer/README.md
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
   validate    The long comparisons with reference solutions, with residuals and tolerances
   wheel       The Python package with the library inside, in target/wheel/
@@ -54,6 +57,7 @@ fn run(arguments: &[String]) -> Result<()> {
         ["header"] => header::header(&sh, false),
         ["header", "--check"] => header::header(&sh, true),
         ["install", arguments @ ..] => install::install(&sh, arguments),
+        ["peer", arguments @ ..] => peer::peer(&sh, arguments),
         ["test"] => test::test(&sh),
         ["wheel"] => wheel::wheel(&sh).map(drop),
         ["validate"] => validate::validate(&sh),

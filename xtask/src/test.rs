@@ -8,6 +8,7 @@ use xshell::{Shell, cmd};
 use crate::ffi_tests::ffi_tests;
 use crate::fmu_tests::fmu_tests;
 use crate::output_tests::output_tests;
+use crate::peer::peer_tests;
 use crate::tally::Tally;
 
 /// A part of the tests: what it is called and how it is run.
@@ -23,6 +24,7 @@ const PARTS: &[Part] = &[
     ("output files", output_tests),
     ("C, C++, Python", ffi_tests),
     ("fmu", fmu_tests),
+    ("peer", peer_tests),
 ];
 
 pub fn test(sh: &Shell) -> Result<()> {
