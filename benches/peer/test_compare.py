@@ -23,9 +23,7 @@ def case(name):
 @pytest.mark.parametrize("name", ["twisting_gently", "bending_gently"])
 def test_lower_orders_come_close_to_the_linear_reference(name):
     curve = case(name).references()[0]
-    residual = compare.largest_deviation(
-        curve[0], case(name).compute(curve[0], across=6, along=16), curve
-    )
+    residual = compare.deviation(curve[0], case(name).compute(curve[0], across=6, along=16), curve).max()
     print(f"{name}: {residual:.1e}")
     assert residual < 1e-3
 
@@ -35,16 +33,26 @@ def test_uniaxial_columns_of_the_two_laws():
     law = references.neo_hookean(tension.material)
     times, top = references.uniaxial_column(tension.material, law, 50.0, tension.end)
     ours, peers = tension.references()
-    residual = compare.largest_deviation(times, top[:, None], ours)
+    residual = compare.deviation(times, top[:, None], ours).max()
     print(f"against the example's reference: {residual:.1e}")
     assert residual < 5e-4
     # The laws agree to first order, and differ by percents at these strains.
-    between = compare.largest_deviation(peers[0], peers[1], ours)
+    between = compare.deviation(peers[0], peers[1], ours).max()
     print(f"between the laws: {between:.1e}")
     assert 0.02 < between < 0.1
     stretch = 1 + 1e-6
     stresses = [f(tension.material)(stretch) for f in (references.neo_hookean, references.logarithmic)]
     assert stresses[0] == pytest.approx(stresses[1], rel=1e-5)
+
+
+def test_time_at_the_same_error():
+    # The last takes longer than the second and is worse.
+    peers = [(0.04, 1.0), (0.01, 4.0), (0.015, 16.0)]
+    results = [compare.Result(compare.PEER[0].name, 0, error=error, cpu=(cpu,)) for error, cpu in peers]
+    for error, expected in [(0.02, "4.0"), (0.04, "2.0"), (0.05, "< 2.0"), (0.005, "> 8.0")]:
+        ours = compare.Result(compare.OURS.name, 0, error=error, cpu=(0.5,))
+        assert compare.at_same_error(ours, [ours, *results]) == expected
+        assert compare.at_same_error(ours, [ours]) == ""
 
 
 def test_without_the_peer_urlsph_is_measured_alone(tmp_path):

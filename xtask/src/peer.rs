@@ -14,7 +14,7 @@ const REQUIREMENTS: &str = "benches/peer/requirements.txt";
 pub fn peer(sh: &Shell, arguments: &[&str]) -> Result<()> {
     let python = venv::python(sh)?;
     if let Err(error) = venv::add(sh, REQUIREMENTS) {
-        eprintln!("The peer is left out: {error:#}");
+        eprintln!("Going on with what is installed: {error:#}");
     }
     let _environment = our_module(sh)?;
     let out = project::target().join("peer");
