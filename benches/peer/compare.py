@@ -418,7 +418,8 @@ def draw(measured, path):
             bottom.plot(times, 100 * deviations, color=colours[name])
         particles = max(r.particles for r in results)
         bottom.set(xlabel="time [s]", ylabel=f"deviation with {particles:,} particles [%]")
-    axes[0, 0].legend()
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     save(figure, path)
     plt.close(figure)
 
