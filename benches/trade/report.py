@@ -108,12 +108,6 @@ class Case:
                 least = run["errors"][quantity]
         return front
 
-    def name_of(self, run):
-        """The setting of a run with its axis where the setting alone does not tell."""
-        if run["axis"] in ("dissipation", "update of the reference", self.own_axis):
-            return {self.own_axis: run["setting"]}.get(run["axis"], f"{run['axis']}: {run['setting']}")
-        return run["setting"]
-
 
 def ticks(axis, limits, label):
     """Decades are labelled, and 2 and 5 between them where there are few decades."""
@@ -147,11 +141,12 @@ def panels(case, quantity):
 
 
 def points(runs, work, quantity):
-    pairs = [(run[work], usable(run, quantity)) for run in runs]
-    return [(w, e) for w, e in pairs if e]
+    """Work and error of the runs that have both."""
+    found = [run for run in runs if usable(run, quantity)]
+    return [run[work] for run in found], [run["errors"][quantity] for run in found]
 
 
-def lost(panel, case, runs, work, top, colour):
+def lost(panel, runs, work, top, colour):
     """Unstable and failed runs as crosses on the upper edge, at the work that they had done."""
     least, most = panel.get_xlim()
     found = [min(max(run[work], least), most) for run in runs if run["status"] != "ok"]
@@ -183,9 +178,8 @@ def axis_picture(case, axis, settings, own, quantity):
     any_lost = False
     for panel, (work, _) in zip(axes, AXES):
         for label, runs, colour, marker in case.lines(axis, settings, own):
-            line = points(runs, work, quantity)
             panel.plot(
-                *(zip(*line) if line else ([], [])),
+                *points(runs, work, quantity),
                 color=colour,
                 marker=marker,
                 ms=5,
@@ -193,7 +187,7 @@ def axis_picture(case, axis, settings, own, quantity):
                 zorder=2 if colour == OWN else 3,
                 label=label,
             )
-            any_lost |= lost(panel, case, runs, work, top, colour)
+            any_lost |= lost(panel, runs, work, top, colour)
     return picture(finish(figure, axes, any_lost), f"{case.title}: {axis}")
 
 
@@ -201,15 +195,12 @@ def overview_picture(case, quantity):
     figure, axes, top = panels(case, quantity)
     any_lost = False
     for panel, (work, _) in zip(axes, AXES):
-        all_points = points(case.runs, work, quantity)
-        panel.plot(*zip(*all_points), "o", color="0.6", ms=3.5, label="all runs")
+        panel.plot(*points(case.runs, work, quantity), "o", color="0.6", ms=3.5, label="all runs")
         base = points(case.base(), work, quantity)
-        panel.plot(*zip(*base), "o-", color=OWN, lw=2, ms=5, label="as the scene")
+        panel.plot(*base, "o-", color=OWN, lw=2, ms=5, label=case.own_setting)
         front = points(case.front(work, quantity), work, quantity)
-        panel.step(
-            *zip(*front), where="post", color=FRONT, lw=1.2, marker="D", ms=4, label="Pareto front"
-        )
-        any_lost |= lost(panel, case, case.runs, work, top, "0.3")
+        panel.step(*front, where="post", color=FRONT, lw=1.2, marker="D", ms=4, label="Pareto front")
+        any_lost |= lost(panel, case.runs, work, top, "0.3")
     return picture(finish(figure, axes, any_lost), f"{case.title}: all runs")
 
 
@@ -268,7 +259,7 @@ def front_table(case, quantity):
     for run in case.front("seconds", quantity):
         rows.append(
             E.TR(
-                E.TD(case.name_of(run)),
+                E.TD(run["setting"]),
                 E.TD(run["size"]),
                 E.TD(percent(run["errors"][quantity])),
                 E.TD(number(run["seconds"])),
@@ -302,7 +293,7 @@ def lost_table(case):
     rows = []
     for run in case.runs:
         if run["status"] != "ok":
-            cells = [case.name_of(run), run["size"], run["status"], f"{number(run['time'])} s"]
+            cells = [run["setting"], run["size"], run["status"], f"{number(run['time'])} s"]
             rows.append(E.TR(*[E.TD(c) for c in cells], E.TD(run["reason"], E.CLASS("text"))))
     heads = ["setting", "size", "", "reached", "reason"]
     return table([E.TH(h) for h in heads], rows) if rows else E.P("No run was unstable or failed.")

@@ -48,22 +48,22 @@ pub const AXES: &[Axis] = &[
     (
         "update of the reference",
         &[
-            ("never", &["numerics.reference_update=never"]),
+            ("never updated", &["numerics.reference_update=never"]),
             (
-                "every 10 steps",
+                "updated every 10 steps",
                 &["numerics.reference_update={\"every\": 10}"],
             ),
-            ("every step, option 1", &[EVERY_STEP]),
+            ("updated every step", &[EVERY_STEP]),
             (
-                "every step, option 2",
+                "every step, kernel option 2",
                 &[EVERY_STEP, "numerics.kernel_option=2"],
             ),
             (
-                "every step, option 3",
+                "every step, kernel option 3",
                 &[EVERY_STEP, "numerics.kernel_option=3"],
             ),
             (
-                "every step, option 4",
+                "every step, kernel option 4",
                 &[EVERY_STEP, "numerics.kernel_option=4"],
             ),
             (
@@ -80,23 +80,23 @@ pub const AXES: &[Axis] = &[
         "dissipation",
         &[
             (
-                "none",
+                "no dissipation",
                 &[
                     "numerics.dissipation=false",
                     "numerics.dissipation_coefficient=1",
                     "numerics.limiter=none",
                 ],
             ),
-            ("coefficient 0.1", &["numerics.dissipation_coefficient=0.1"]),
-            ("coefficient 0.3", &["numerics.dissipation_coefficient=0.3"]),
-            ("coefficient 1", &["numerics.dissipation_coefficient=1"]),
+            ("dissipation 0.1", &["numerics.dissipation_coefficient=0.1"]),
+            ("dissipation 0.3", &["numerics.dissipation_coefficient=0.3"]),
+            ("dissipation 1", &["numerics.dissipation_coefficient=1"]),
         ],
     ),
     (
         "volume dissipation",
         &[
             (
-                "without D^j",
+                "no D^j",
                 &["numerics.volume_dissipation=0", "numerics.state=f"],
             ),
             (

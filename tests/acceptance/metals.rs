@@ -17,7 +17,11 @@ fn simulation_of(bar: Bar, case: &str, overrides: &[&str]) -> Simulation {
 }
 
 /// The sizes of the paper: 1,554 (the paper's is 1,560), 3,721 (3,744) and 7,280 particles.
-const SIZES: [Bar; 3] = [Bar::new(3, 41), Bar::new(4, 60), Bar::new(5, 79)];
+const SIZES: [Bar; 3] = [
+    Bar::of_the_paper(3),
+    Bar::of_the_paper(4),
+    Bar::of_the_paper(5),
+];
 
 /// Without D^j the roughness is 0.9 in the copper bar, 0.7 and 1.1 in the bars that neck.
 fn pressure_is_smooth(s: &Simulation, tolerance: f64) {

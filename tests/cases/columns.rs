@@ -181,7 +181,7 @@ pub const BENDING_CASE: Case = Case {
     title: "Bending column",
     example: BENDING.name,
     sizes: SIZES,
-    swept: 4,
+    swept: 3,
     leave_out: &[],
     reference: SPECTRAL,
     quantities: &[
@@ -205,6 +205,7 @@ pub const TENSION_CASE: Case = Case {
     name: "tension",
     title: "Column in tension",
     example: TENSION.name,
+    swept: 4,
     reference: "one-dimensional finite volumes, 2,000 cells",
     quantities: &[Quantity {
         name: "displacement of the top",
@@ -220,6 +221,7 @@ pub const TWISTING_CASE: Case = Case {
     name: "twisting",
     title: "Twisting column",
     example: TWISTING.name,
+    swept: 4,
     quantities: &[Quantity {
         name: "angle of the top corner",
         over: "largest distance to the reference up to 0.1 s, over the largest angle",

@@ -16,6 +16,11 @@ impl Bar {
         Self { divisions, layers }
     }
 
+    /// The bars of the paper have 41, 60 and 79 layers for 3, 4 and 5 divisions.
+    pub const fn of_the_paper(divisions: u32) -> Self {
+        Self::new(divisions, 19 * divisions - 16)
+    }
+
     pub fn particles(self) -> usize {
         let section = 3 * self.divisions * (self.divisions + 1) + 1;
         (section * (self.layers + 1)) as usize
@@ -89,7 +94,7 @@ const SIZES: &[Size] = &[
 ];
 
 fn overrides(size: &Size) -> Vec<String> {
-    Bar::new(size.cells, 19 * size.cells - 16).overrides()
+    Bar::of_the_paper(size.cells).overrides()
 }
 
 pub const COPPER: Case = Case {
