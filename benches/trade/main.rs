@@ -18,9 +18,10 @@ use std::time::{Duration, Instant};
 use std::{fs, io, thread};
 
 use clap::Parser;
+use rustix::time::{ClockId, clock_gettime};
 use urlsph::{Scene, Simulation};
 
-use cases::{CASES, Case, Meter, Size, cpu_seconds, example};
+use cases::{CASES, Case, Meter, Size, example};
 use results::{Outcome, Results, Status};
 use settings::{AXES, OWN, Setting};
 
@@ -67,6 +68,12 @@ fn names() -> clap::builder::PossibleValuesParser {
         .map(|case| case.name)
         .collect::<Vec<_>>()
         .into()
+}
+
+/// CPU time of all threads of this process [s].
+fn cpu_seconds() -> f64 {
+    let now = clock_gettime(ClockId::ProcessCPUTime);
+    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
 }
 
 /// The cases of `--quick`.
@@ -118,7 +125,7 @@ impl Run {
             Err(error) => return Outcome::failed(format!("set-up: {error}")),
         };
         let setup_seconds = cpu_seconds() - start;
-        let mut meter = Meter::default();
+        let mut meter = Meter::new(cpu_seconds);
         let measured = (self.case.measure)(&mut simulation, &mut meter);
         let (status, reason, errors) = match measured {
             Err(error) => (Status::Failed, Some(error.to_string()), Vec::new()),

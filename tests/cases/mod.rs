@@ -13,7 +13,6 @@ pub mod thermo_wave;
 
 use std::path::{Path, PathBuf};
 
-use rustix::time::{ClockId, clock_gettime};
 use urlsph::{Result, Simulation};
 
 /// A case as the bench runs it.
@@ -62,24 +61,42 @@ pub struct Quantity {
 }
 
 /// What stepping cost, without the set-up and without what is read off between the steps.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Meter {
+    /// Tells the time that is counted [s].
+    clock: fn() -> f64,
+    /// Of the steps, by the clock [s].
+    pub seconds: f64,
     pub steps: u64,
     /// Directed pairs times right-hand sides.
     pub pair_updates: u64,
-    /// CPU time of all threads of the process [s].
-    pub seconds: f64,
+}
+
+impl Default for Meter {
+    /// Without a clock, where time does not matter.
+    fn default() -> Self {
+        Self::new(|| 0.0)
+    }
 }
 
 impl Meter {
     /// Right-hand sides of a step.
     const STAGES: u64 = 3;
 
+    pub fn new(clock: fn() -> f64) -> Self {
+        Self {
+            clock,
+            seconds: 0.0,
+            steps: 0,
+            pair_updates: 0,
+        }
+    }
+
     /// Advances a simulation, and counts.
     pub fn advance(&mut self, simulation: &mut Simulation, to: f64) -> Result<()> {
-        let (steps, start) = (simulation.steps(), cpu_seconds());
+        let (steps, start) = (simulation.steps(), (self.clock)());
         let result = simulation.advance(to);
-        self.seconds += cpu_seconds() - start;
+        self.seconds += (self.clock)() - start;
         let steps = simulation.steps() - steps;
         self.steps += steps;
         self.pair_updates += Self::STAGES * steps * simulation.pair_count() as u64;
@@ -101,12 +118,6 @@ impl Meter {
         }
         Ok(())
     }
-}
-
-/// CPU time of this process [s].
-pub fn cpu_seconds() -> f64 {
-    let now = clock_gettime(ClockId::ProcessCPUTime);
-    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
 }
 
 /// A file of an example.
