@@ -35,9 +35,9 @@ def read_table(path):
 
 
 def save(figure, path):
-    """Saves a figure in a small file, by its path or open."""
+    """Saves a figure in a small file."""
     figure.canvas.draw()
     # A palette makes the file a third as large; coverage keeps the rare ends of the colour bar.
     picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
     picture = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE)
-    picture.save(path, "PNG", optimize=True)
+    picture.save(path, optimize=True)

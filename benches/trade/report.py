@@ -17,8 +17,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
 
-import plotting  # noqa: E402
-from plotting import plt  # noqa: E402
+from plotting import plt, style  # noqa: E402
 
 COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c6d31"]
 MARKERS = "osD^vP*X"
@@ -164,7 +163,7 @@ def finish(figure, axes, any_lost):
         labels.append("unstable or failed")
     figure.legend(handles, labels, loc="outside right center")
     file = io.BytesIO()
-    plotting.save(figure, file)
+    figure.savefig(file, pil_kwargs={"optimize": True})
     plt.close(figure)
     return base64.b64encode(file.getvalue()).decode()
 
@@ -396,7 +395,7 @@ def main(path):
     results = json.loads(path.read_text())
     if results["format"] != 1:
         sys.exit(f"{path} has format {results['format']} and not 1: it was written by another version")
-    plotting.style()
+    style()
     cases = [Case(case, results["runs"], results["axes"]) for case in results["cases"]]
     write_csv(path.with_name("results.csv"), cases)
     report = path.with_name("report.html")
