@@ -90,7 +90,8 @@ class Case:
     def lines(self, axis, settings, own):
         """Label, runs, colour and marker of every line of an axis, the scene's own first."""
         if axis == "CFL":
-            own = f"CFL {number(self.base()[0]['cfl'])}"
+            known = [run["cfl"] for run in self.base() if run["cfl"] > 0]
+            own = f"CFL {number(known[0])}" if known else None
         label = self.own_setting + (f": {own}" if own else "")
         yield label, self.base(), OWN, "o"
         for i, setting in enumerate(settings):
