@@ -2,11 +2,8 @@
 
 use urlsph::{Field, Scene, Simulation};
 
+use crate::cases::cable::{LENGTH, LOAD, Shock, lattice};
 use crate::support::*;
-
-/// Step load [Pa]; also the velocity behind the first wave [m/s], with E = rho = 1.
-const LOAD: f64 = 1e-3;
-const LENGTH: f64 = 10.0;
 
 /// Names in the tables and what they set.
 const LIMITERS: [(&str, &[&str]); 5] = [
@@ -20,26 +17,11 @@ const LIMITERS: [(&str, &[&str]); 5] = [
     ("shock", &["numerics.limiter=shock"]),
 ];
 
-/// What a shock leaves behind, relative to the load: the velocity and the stress in the middle of the
-/// cable over time.
-struct Shock {
-    /// Largest |v| in the middle, less the exact largest.
-    overshoot: f64,
-    /// Largest stress in the middle, less the exact largest.
-    stress_overshoot: f64,
-    /// Largest |v| of any particle at any time, less the exact largest.
-    anywhere: f64,
-    /// Mean of |v - exact| in the middle over the first half and over all of the history.
-    l1: [f64; 2],
-    /// The same of the stress over all of the history.
-    stress_l1: f64,
-}
-
 /// A cable of `cells` cells along its length and 1 x 2 or, on a cubic lattice, 2 x 2 across.
-fn cable(file: &str, cells: usize, cubic: bool, overrides: &[&str]) -> Simulation {
-    let spacing = LENGTH / cells as f64;
-    let mut all = vec![format!("geometry.box.spacing=[{spacing}, 1, 0.5]")];
+fn cable(file: &str, cells: u32, cubic: bool, overrides: &[&str]) -> Simulation {
+    let mut all = vec![lattice(cells)];
     if cubic {
+        let spacing = LENGTH / f64::from(cells);
         let side = 2.0 * spacing;
         all[0] = format!("geometry.box.spacing={spacing}");
         all.push(format!("geometry.box.max=[{LENGTH}, {side}, {side}]"));
@@ -49,50 +31,8 @@ fn cable(file: &str, cells: usize, cubic: bool, overrides: &[&str]) -> Simulatio
     Simulation::with_threads(scene, 1).unwrap_or_else(|e| panic!("{file} {all:?}: {e}"))
 }
 
-/// The particle next to X on the edge Y = Z = 0.
-fn on_the_edge(simulation: &Simulation, x: f64) -> usize {
-    field(simulation, Field::InitialPosition)
-        .chunks_exact(3)
-        .position(|p| (p[0] - x).abs() < 1e-9 && p[1] == 0.0 && p[2] == 0.0)
-        .expect("a particle")
-}
-
 fn shock(simulation: &mut Simulation, exact: &Table) -> Shock {
-    let middle = on_the_edge(simulation, 0.5 * LENGTH);
-    let columns = ["probe.middle.velocity[1]", "stress"].map(|name| exact.column(name));
-    let (v_exact, s_exact) = (columns[0], columns[1]);
-    let most = |column: usize| {
-        exact
-            .samples(column)
-            .fold(0.0_f64, |m, (_, value)| m.max(value.abs()))
-    };
-    let (mut v_most, mut s_most, mut anywhere) = (0.0_f64, 0.0_f64, 0.0_f64);
-    let (mut half, mut whole, mut stress, mut before) = (0.0, 0.0, 0.0, 0.0);
-    let end = exact.end();
-    run(simulation, end, |s| {
-        let velocity = field(s, Field::Velocity);
-        let (v, sigma) = (
-            velocity[3 * middle],
-            field(s, Field::CauchyStress)[9 * middle],
-        );
-        (v_most, s_most) = (v_most.max(v.abs()), s_most.max(sigma.abs()));
-        anywhere = velocity.iter().fold(anywhere, |m, v| m.max(v.abs()));
-        let (time, step) = (s.time(), s.time() - before);
-        before = time;
-        let error = step * (v - exact.at(v_exact, time)).abs();
-        whole += error;
-        if time <= 0.5 * end {
-            half += error;
-        }
-        stress += step * (sigma - exact.at(s_exact, time)).abs();
-    });
-    Shock {
-        overshoot: (v_most - most(v_exact)) / LOAD,
-        stress_overshoot: (s_most - most(s_exact)) / LOAD,
-        anywhere: (anywhere - most(v_exact)) / LOAD,
-        l1: [half / (0.5 * end * LOAD), whole / (end * LOAD)],
-        stress_l1: stress / (end * LOAD),
-    }
+    Shock::measure(simulation, &mut Meter::default(), exact).expect("stable")
 }
 
 fn print(what: &str, s: &Shock) {

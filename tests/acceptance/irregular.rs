@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 use urlsph::{Field, Scene, Simulation};
 
-use crate::columns::{self, BENDING, Case, TWISTING};
-use crate::elastic_cube::{self, AMPLITUDE};
+use crate::cases::columns::{BENDING, Column, TWISTING};
+use crate::cases::elastic_cube::{AMPLITUDE, omega};
 use crate::support::*;
+use crate::{columns, elastic_cube};
 
 fn jitter(fraction: f64) -> String {
     format!("geometry.box.jitter={{\"fraction\": {fraction}, \"seed\": 3}}")
@@ -102,7 +103,7 @@ fn tetrahedra(nodes: usize, folder: &Path) -> String {
 /// Errors of a cube at half a period and at three eighths, for sizes; observed orders between the
 /// first and the last.
 fn cube(what: &str, sizes: &[usize], overrides: impl Fn(usize) -> Vec<String>) -> [f64; 2] {
-    let times = [8e-3, 0.75 * PI / elastic_cube::omega()];
+    let times = [8e-3, 0.75 * PI / omega()];
     let mut least = [f64::INFINITY; 2];
     for time in times {
         let found: Vec<_> = sizes
@@ -175,7 +176,7 @@ fn irregular_cubes_are_second_order() {
 
 /// Errors and dissipation of columns with particles moved by up to 20 % of the spacing, next to those
 /// of the lattice.
-fn columns(cases: &[&Case], models: &[Model]) {
+fn columns(cases: &[&Column], models: &[Model]) {
     println!("\n### columns with 20 % jitter: error over the largest value, D/E0\n");
     println!("| case | model | lattice | jitter | ratio | D/E0 lattice | jitter |");
     println!("|---|---|---|---|---|---|---|");

@@ -3,6 +3,8 @@
 //! --nocapture`); `cargo xtask validate` runs the long ones, which are ignored here.
 
 mod cable;
+#[path = "../cases/mod.rs"]
+mod cases;
 mod columns;
 #[path = "../common/mod.rs"]
 mod common;

@@ -3,77 +3,25 @@
 
 use urlsph::{Code, Energies, Field, Scene, Simulation};
 
+use crate::cases::impact::{Bar, FREE, Impact};
 use crate::support::*;
 
-/// Cells of a quarter cylinder and its number of particles.
-#[derive(Debug, Clone, Copy)]
-struct Bar {
-    divisions: u32,
-    layers: u32,
-    particles: usize,
-    threads: usize,
-}
-
-impl Bar {
-    fn simulation(&self, case: &str, overrides: &[&str]) -> Simulation {
-        let cells = [
-            format!("geometry.cylinder.divisions={}", self.divisions),
-            format!("geometry.cylinder.layers={}", self.layers),
-        ];
-        let mut all: Vec<&str> = cells.iter().map(String::as_str).collect();
-        all.extend_from_slice(overrides);
-        let simulation = with_threads(case, &all, self.threads);
-        assert_eq!(simulation.particle_count(), self.particles, "{case}");
-        simulation
-    }
-}
-
-const fn bar(divisions: u32, layers: u32, threads: usize) -> Bar {
-    let section = 3 * divisions * (divisions + 1) + 1;
-    Bar {
-        divisions,
-        layers,
-        particles: (section * (layers + 1)) as usize,
-        threads,
-    }
+fn simulation_of(bar: Bar, case: &str, overrides: &[&str]) -> Simulation {
+    let cells = bar.overrides();
+    let mut all: Vec<&str> = cells.iter().map(String::as_str).collect();
+    all.extend_from_slice(overrides);
+    let threads = if bar.particles() < 2000 { 1 } else { 2 };
+    let simulation = with_threads(case, &all, threads);
+    assert_eq!(simulation.particle_count(), bar.particles(), "{case}");
+    simulation
 }
 
 /// The sizes of the paper: 1,554 (the paper's is 1,560), 3,721 (3,744) and 7,280 particles.
-const SIZES: [Bar; 3] = [bar(3, 41, 1), bar(4, 60, 2), bar(5, 79, 2)];
-
-/// What is read off a bar that hits a plane.
-#[derive(Debug, Clone, Copy)]
-struct Impact {
-    /// Time [s].
-    time: f64,
-    /// Radius of the foot at the probe `rim` [m].
-    radius: f64,
-    /// Height of the top of the axis above the plane [m].
-    height: f64,
-    /// Height of the top of the axis above its foot [m].
-    length: f64,
-    /// Height of the rim above the plane [m].
-    lift: f64,
-    /// Temperature of the probe `inside` [K], where there is one.
-    inside: Option<f64>,
-}
-
-impl Impact {
-    fn of(s: &Simulation) -> Self {
-        let probes = &s.scene().probes;
-        let (rim, top) = (displacement(s, "rim"), displacement(s, "top"));
-        let height = probes["top"][2] + top[2];
-        Self {
-            time: s.time(),
-            radius: probes["rim"][0] + rim[0],
-            height,
-            length: height - displacement(s, "foot")[2],
-            lift: rim[2],
-            inside: (s.probe_names().iter().position(|n| n == "inside"))
-                .and_then(|probe| s.probe(probe).temperature),
-        }
-    }
-}
+const SIZES: [Bar; 3] = [
+    Bar::of_the_paper(3),
+    Bar::of_the_paper(4),
+    Bar::of_the_paper(5),
+];
 
 /// Without D^j the roughness is 0.9 in the copper bar, 0.7 and 1.1 in the bars that neck.
 fn pressure_is_smooth(s: &Simulation, tolerance: f64) {
@@ -173,18 +121,14 @@ fn copper(
     for bar in bars {
         let mut overrides = vec![separation.as_str()];
         overrides.extend_from_slice(grading);
-        let mut simulation = bar.simulation("copper_impact", &overrides);
+        let mut simulation = simulation_of(*bar, "copper_impact", &overrides);
         let run = Run::new(&mut simulation);
         let end = run.end();
-        let at = |name: &str| reference.at(reference.column(name), end.time);
-        let error = [
-            end.radius / at(columns[0]) - 1.0,
-            end.height / at(columns[1]) - 1.0,
-        ];
+        let error = end.errors(&reference, columns);
         let distances = run.distances(&reference, columns);
         rows.push(format!(
             "| {} | {:.3} | {:+.2} % | {:.3} | {:.3} | {:+.2} % | {:.2} % | {:.2} % | {:.3} | {:.4} | {:.4} |",
-            bar.particles,
+            bar.particles(),
             1e3 * end.radius,
             100.0 * error[0],
             1e3 * mean_radius(&simulation),
@@ -202,7 +146,9 @@ fn copper(
     for (bar, error) in bars.iter().zip(&errors) {
         println!(
             "copper_impact, {what}, {}: {:.4} {:.4}",
-            bar.particles, error[0], error[1]
+            bar.particles(),
+            error[0],
+            error[1]
         );
     }
     for part in [0, 1] {
@@ -214,7 +160,6 @@ fn copper(
     errors
 }
 
-const FREE: [&str; 2] = ["radius", "length"];
 const ROLLER: [&str; 2] = ["roller_radius", "roller_length"];
 
 #[test]
@@ -245,7 +190,7 @@ fn copper_bar_in_full() {
     let errors = copper(
         "free contact, graded",
         true,
-        &[bar(6, 79, 2)],
+        &[Bar::new(6, 79)],
         &grading,
         FREE,
     );
@@ -296,7 +241,7 @@ impl Hot {
 /// A bar that starts free of stress at a temperature.
 fn taylor(bar: Bar, temperature: f64) -> Hot {
     let start = format!("heat.reference_temperature={temperature}");
-    let mut simulation = bar.simulation("taylor_johnson_cook", &[&start]);
+    let mut simulation = simulation_of(bar, "taylor_johnson_cook", &[&start]);
     check(
         "stress at the start over the yield stress",
         field(&simulation, Field::Pressure)
@@ -318,7 +263,7 @@ fn taylor(bar: Bar, temperature: f64) -> Hot {
     let history = TIMES.map(|time| format!("{:.1}", hot.inside_at(time)));
     println!(
         "| {temperature} | {} | {:.3} | {:.3} | {} | {hottest:.0} | {:.4} | {:.4} |",
-        bar.particles,
+        bar.particles(),
         1e3 * last.radius,
         1e3 * last.length,
         history.join(" | "),
@@ -390,7 +335,7 @@ const GENOG: [(u32, f64, f64); 3] = [
 /// The aluminium bar with as many cells in the radius as in the table.
 fn aluminium(row: usize) -> Impact {
     let (cells, length, radius) = GENOG[row];
-    let mut simulation = bar(cells / 2, 6 * cells, 2).simulation("aluminium_round_bar", &[]);
+    let mut simulation = simulation_of(Bar::new(cells / 2, 6 * cells), "aluminium_round_bar", &[]);
     let run = Run::new(&mut simulation);
     // The bar leaves the plane: its length is that between its ends, at its shortest.
     let end = run.end();

@@ -4,22 +4,10 @@ use std::f64::consts::PI;
 
 use urlsph::Field;
 
+use crate::cases::slab::{self, COLD, CONDUCTIVITY, TAUS, heated, lattice, rise};
 use crate::support::*;
 
-/// Diffusivity of the scene [m^2/s]; the slab is 1 m thick.
-const DIFFUSIVITY: f64 = 20.0;
-const CONDUCTIVITY: f64 = 20_000.0;
-const FLUX: f64 = 2e6;
-const COLD: f64 = 293.15;
 const HOT: f64 = 393.15;
-
-/// (theta - theta_0) h/(q_0 L) at xi = x/L, tau = h t/(c_v L^2) of a slab that is heated at xi = 0
-/// and insulated at xi = 1.
-fn heated(xi: f64, tau: f64) -> f64 {
-    let term = |n: f64| (-(n * PI).powi(2) * tau).exp() * (n * PI * xi).cos() / (n * n);
-    let sum: f64 = (1..100).map(|n| term(f64::from(n))).sum();
-    tau + (3.0 * (1.0 - xi).powi(2) - 1.0) / 6.0 - 2.0 / PI.powi(2) * sum
-}
 
 /// (theta - theta_ambient)/(theta_0 - theta_ambient) of a slab that loses heat at xi = 0: separation of
 /// variables leaves cos(zeta (1 - xi)) with zeta tan zeta = Bi, one root in each (n pi, n pi + pi/2), and
@@ -48,33 +36,19 @@ fn roots(biot: f64) -> Vec<f64> {
     (0..50).map(root).collect()
 }
 
-/// Largest errors over the slab at times tau, each over the exact value at the surface (xi = 0) then.
+/// Largest errors over the slab at times tau.
 fn errors(
     cells: u32,
     overrides: &[&str],
     taus: &[f64],
     exact: impl Fn(f64, f64) -> f64,
 ) -> Vec<f64> {
-    let spacing = 1.0 / f64::from(cells);
-    let lattice = format!(
-        "geometry.box={{\"min\": [0, 0, 0], \"max\": [1, {spacing}, {spacing}], \"spacing\": {spacing}}}"
-    );
+    let lattice = lattice(cells);
     let mut all = vec![lattice.as_str()];
     all.extend_from_slice(overrides);
     let mut simulation = simulation("slab_heating", &all);
-    let positions = field(&simulation, Field::InitialPosition);
-    taus.iter()
-        .map(|tau| {
-            simulation.advance(tau / DIFFUSIVITY).expect("stable");
-            let temperatures = field(&simulation, Field::Temperature);
-            let errors = std::iter::zip(positions.chunks_exact(3), temperatures)
-                .map(|(x, theta)| (theta - exact(x[0], *tau)).abs());
-            errors.fold(0.0, f64::max)
-        })
-        .collect()
+    slab::errors(&mut simulation, &mut Meter::default(), taus, exact).expect("stable")
 }
-
-const TAUS: [f64; 4] = [0.05, 0.1, 0.2, 0.5];
 
 /// Errors with 41 particles over `scale(tau)` below a tolerance, and second order from 21.
 fn second_order(
@@ -97,13 +71,10 @@ fn second_order(
 /// Within 1 % of the surface's rise of temperature, 63 K at tau = 0.05 and 208 K at 0.5.
 #[test]
 fn heat_flux() {
-    let scale = FLUX / CONDUCTIVITY;
     for neighbours in ["6", "18"] {
         let set = format!("numerics.neighbours={neighbours}");
-        let exact = |xi, tau| COLD + scale * heated(xi, tau);
-        let rise = |tau| scale * heated(0.0, tau);
         let what = format!("heated, {neighbours} neighbours,");
-        second_order(&what, &[&set], exact, rise, 0.01);
+        second_order(&what, &[&set], heated, rise, 0.01);
     }
 }
 

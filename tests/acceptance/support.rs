@@ -1,10 +1,9 @@
-//! What the acceptance tests share: scenes of the examples, runs step by step, reference tables.
-
-use std::path::{Path, PathBuf};
+//! What the acceptance tests share: scenes of the examples, runs step by step.
 
 use nalgebra::{Matrix4, Vector4};
 use urlsph::{Field, Scene, Simulation};
 
+pub use crate::cases::{Meter, Table, displacement, example, norm};
 pub use crate::common::field;
 
 /// A model of the columns: name and lattice spacing [m].
@@ -19,13 +18,6 @@ pub const M2: Model = Model("M2", 1.0 / 6.0);
 pub const M3: Model = Model("M3", 1.0 / 8.0);
 /// 17 x 97 x 17 particles.
 pub const M4: Model = Model("M4", 1.0 / 16.0);
-
-/// A file of an example.
-pub fn example(case: &str, file: &str) -> PathBuf {
-    [env!("CARGO_MANIFEST_DIR"), "examples", case, file]
-        .iter()
-        .collect()
-}
 
 /// The scene of an example with overrides.
 pub fn scene(case: &str, overrides: &[&str]) -> Scene {
@@ -54,23 +46,11 @@ pub fn column(case: &str, model: Model, overrides: &[&str]) -> Simulation {
 }
 
 /// Runs to `end` in stable steps and shows the simulation after every one.
-pub fn run(simulation: &mut Simulation, end: f64, mut after: impl FnMut(&Simulation)) {
-    while simulation.time() < end {
-        // A hair less than the stable step, so that rounding does not make two of it.
-        let next = simulation.time() + simulation.stable_step() * (1.0 - 1e-9);
-        simulation
-            .advance(next.min(end))
-            .unwrap_or_else(|e| panic!("{}: {e}", simulation.scene().title));
-        after(simulation);
-    }
-}
-
-/// Displacement of a probe by name.
-pub fn displacement(simulation: &Simulation, probe: &str) -> [f64; 3] {
-    let index = simulation.probe_names().iter().position(|n| n == probe);
-    simulation
-        .probe(index.expect("a probe of the scene"))
-        .displacement
+pub fn run(simulation: &mut Simulation, end: f64, after: impl FnMut(&Simulation)) {
+    let title = simulation.scene().title.clone();
+    Meter::default()
+        .run(simulation, end, after)
+        .unwrap_or_else(|e| panic!("{title}: {e}"));
 }
 
 /// Prints a residual with its tolerance and fails if it is larger, or not a number.
@@ -111,11 +91,6 @@ pub fn dissipation_ratio(simulation: &Simulation) -> f64 {
 /// Observed order between two resolutions.
 pub fn order(coarse: (f64, f64), fine: (f64, f64)) -> f64 {
     (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
-}
-
-/// Euclidean norm.
-pub fn norm(values: &[f64]) -> f64 {
-    values.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 /// What a linear field does not explain: the residual of a particle's pressure against the linear fit to
@@ -175,63 +150,5 @@ impl Roughness {
         };
         let rough = weighed(&|a| residual(a).powi(2));
         (rough / weighed(&|a| (pressure[a] - mean).powi(2))).sqrt()
-    }
-}
-
-/// Columns of numbers over time.
-pub struct Table {
-    names: Vec<String>,
-    rows: Vec<Vec<f64>>,
-}
-
-impl Table {
-    /// The reference solution of an example.
-    pub fn expected(case: &str) -> Self {
-        Self::read(&example(case, "expected.csv"))
-    }
-
-    /// The table in a file.
-    pub fn read(path: &Path) -> Self {
-        let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
-        let mut lines = text.lines();
-        let names = lines
-            .next()
-            .expect("a header")
-            .split(',')
-            .map(str::to_owned)
-            .collect();
-        let number = |s: &str| s.parse().unwrap_or_else(|e| panic!("{path:?}: `{s}`: {e}"));
-        let rows = lines
-            .map(|line| line.split(',').map(number).collect())
-            .collect();
-        Self { names, rows }
-    }
-
-    /// Index of a column.
-    pub fn column(&self, name: &str) -> usize {
-        self.names
-            .iter()
-            .position(|n| n == name)
-            .unwrap_or_else(|| panic!("no column {name}"))
-    }
-
-    /// Last time.
-    pub fn end(&self) -> f64 {
-        self.rows.last().expect("rows")[0]
-    }
-
-    /// Value of a column at a time, linear between the rows.
-    pub fn at(&self, column: usize, time: f64) -> f64 {
-        let next = self
-            .rows
-            .partition_point(|row| row[0] < time)
-            .clamp(1, self.rows.len() - 1);
-        let (a, b) = (&self.rows[next - 1], &self.rows[next]);
-        a[column] + (time - a[0]) / (b[0] - a[0]) * (b[column] - a[column])
-    }
-
-    /// Times and values of a column.
-    pub fn samples(&self, column: usize) -> impl Iterator<Item = (f64, f64)> {
-        self.rows.iter().map(move |row| (row[0], row[column]))
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use urlsph::Field;
 
-use crate::elastic_cube::{gradient, shape};
+use crate::cases::elastic_cube::{gradient, shape};
 use crate::support::*;
 
 const DENSITY: f64 = 1100.0;

@@ -1,5 +1,6 @@
 //! The project's tasks: `cargo xtask <task>`.
 
+mod bench;
 mod demo;
 mod ffi_tests;
 mod fmu_tests;
@@ -22,6 +23,8 @@ const HELP: &str = "\
 Usage: cargo xtask <TASK>
 
 Tasks:
+  bench       Speed against accuracy: cases with reference solutions over resolution and numerics, as
+              JSON, CSV and a report under target/bench/; --quick takes a minute (bench --help)
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
@@ -51,6 +54,7 @@ fn run(arguments: &[String]) -> Result<()> {
     let sh = project::shell()?;
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments.as_slice() {
+        ["bench", arguments @ ..] => bench::bench(&sh, arguments),
         ["demo"] => demo::demo(&sh),
         ["ffi-tests"] => ffi_tests::run(&sh),
         ["fmu-tests"] => fmu_tests::run(&sh),

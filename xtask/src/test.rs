@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::bench::bench_tests;
 use crate::ffi_tests::ffi_tests;
 use crate::fmu_tests::fmu_tests;
 use crate::output_tests::output_tests;
@@ -22,6 +23,7 @@ const PARTS: &[Part] = &[
     ("documentation", documentation),
     ("rust", rust),
     ("output files", output_tests),
+    ("bench", bench_tests),
     ("C, C++, Python", ffi_tests),
     ("fmu", fmu_tests),
     ("peer", peer_tests),
