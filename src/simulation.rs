@@ -192,6 +192,12 @@ impl Simulation {
             );
             error.at_particle(place.particle.unwrap_or(0), place.position)
         })?;
+        if this.url.conducts() {
+            let (url, state, reference) = (&mut this.url, &this.state, &this.reference);
+            this.pool
+                .install(|| url.calibrate_conduction(state, reference));
+            this.evaluate()?;
+        }
         this.first_length = this.evaluation.length;
         let e = &this.evaluation;
         this.accounts.initial = e.kinetic + e.strain + e.thermal - supplied;

@@ -414,6 +414,21 @@ impl Url {
         Ok(total)
     }
 
+    /// Whether heat is conducted.
+    pub fn conducts(&self) -> bool {
+        self.conduction.is_some()
+    }
+
+    /// Sees to it that the steps of conduction are stable, from the evaluation of a body's first state; the
+    /// rates have to be evaluated again.
+    pub fn calibrate_conduction(&mut self, state: &State, reference: &Reference) {
+        if let (Some(conduction), Some(heat)) = (&mut self.conduction, &mut self.rates.heat) {
+            let input = ForceInput::new(state, reference, &self.scratch);
+            let kinematics = Kinematics::new(state, reference);
+            conduction.calibrate::<Vectors>(&input, &kinematics, heat);
+        }
+    }
+
     /// Gradient, law and point passes; what is stored and how it moves, by slab.
     fn points<R: Runner>(
         &mut self,

@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use urlsph::Field;
+use urlsph::{Field, Simulation};
 
+use crate::cases::largest;
 use crate::cases::slab::{self, COLD, CONDUCTIVITY, TAUS, heated, lattice, rise};
 use crate::support::*;
 
@@ -118,4 +119,53 @@ fn convection_of_any_strength_is_stable() {
         1e-9,
     );
     check("slab, strong convection: above the start", most - HOT, 1e-9);
+}
+
+/// Temperatures that alternate from particle to particle die out with the step that is taken by itself, also in
+/// bodies of one cell from side to side, whose ends' gradients follow one and the same difference.
+#[test]
+fn alternating_temperatures_die_out() {
+    let bodies = [
+        ("bar of 2 x 2 rows", "[1, 0.025, 0.025]", ""),
+        ("cube of 2^3 particles", "[0.025, 0.025, 0.025]", ""),
+        ("plate of two layers", "[0.2, 0.2, 0.025]", ""),
+        ("block of 9^3 particles", "[0.2, 0.2, 0.2]", ""),
+        (
+            "block with 20 % jitter",
+            "[0.2, 0.2, 0.2]",
+            "{\"fraction\": 0.2}",
+        ),
+    ];
+    let alternating = |axis: char| format!("cos(pi*{axis}/0.025)");
+    let [x, y, z] = ['X', 'Y', 'Z'].map(alternating);
+    let start = format!("initial.temperature=293.15 + 1e-3*({x}*{y}*{z} + {y}*{z} + {z})");
+    for (name, max, jitter) in bodies {
+        for neighbours in [6, 18, 26] {
+            let mut overrides = vec![
+                format!("geometry.box.max={max}"),
+                format!("numerics.neighbours={neighbours}"),
+                "boundary.x_min.heat_flux=0".to_string(),
+                "probes={}".to_string(),
+                start.clone(),
+            ];
+            if !jitter.is_empty() {
+                overrides.push(format!("geometry.box.jitter={jitter}"));
+            }
+            let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+            let mut simulation = simulation("slab_heating", &overrides);
+            let spread = |simulation: &Simulation| {
+                let theta = field(simulation, Field::Temperature);
+                let mean = theta.iter().sum::<f64>() / theta.len() as f64;
+                largest(theta.iter().map(|t| (t - mean).abs()))
+            };
+            let (first, mut last) = (spread(&simulation), f64::INFINITY);
+            // Where most of the decay is over, and a mode that grows has had time to.
+            run(&mut simulation, 5e-3, |s| last = spread(s));
+            check(
+                &format!("{name}, {neighbours} neighbours: temperatures over those at the start"),
+                last / first,
+                1e-3,
+            );
+        }
+    }
 }
