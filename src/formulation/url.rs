@@ -1,9 +1,10 @@
 //! Updated Reference Lagrangian SPH, isothermal ([URL22] section 4.3).
 //!
-//! One evaluation has three passes over the body, each in slabs:
+//! One evaluation has three passes over the body, each in slabs, or in longer pieces (3):
 //! 1. gradient: grad_chi v from the neighbours' velocities (54);
 //! 2. point: stress and everything else that belongs to one particle;
-//! 3. force: T_a (57) from the neighbours' stresses and the Riemann dissipation (59).
+//! 3. force: T_a (57) from the neighbours' stresses and the Riemann dissipation (59), each pair once for both
+//!    of its particles.
 //!
 //! With g_ab, L_a as in [`crate::reference`] the force of a pair is Q_a g_ab - Q_b g_ba + D_ab,
 //! Q = V_chi sigma_chi L = V_R P F_chi^T L, and its spatial area c_ab = S_a g_ab - S_b g_ba,
@@ -77,7 +78,8 @@ pub(super) struct Scratch {
     pub theta: Option<Array<2>>,
 }
 
-/// What the pairs of the force pass do across the ends of its pieces.
+/// What the pairs of the force pass do across the ends of its pieces: kept apart and added afterwards, so
+/// that no pair is computed twice and the sums have one order for any number of threads.
 #[derive(Debug)]
 struct Across {
     /// Slices of a piece: at least the reach.

@@ -3,8 +3,7 @@
 use super::slices::Slices;
 use super::{load3, load9};
 use crate::lane::{Lane, SLICE, Slots};
-use crate::layout::Layout;
-use crate::layout::level;
+use crate::layout::{Layout, level};
 use crate::math::*;
 
 /// Pair vectors g_ab and g_ba of a pair.
