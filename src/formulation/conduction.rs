@@ -37,7 +37,8 @@ const STABLE_SHARE: f64 = 0.5;
 const REAL_AXIS: f64 = 2.512_745_326_618_33;
 /// What is taken of it, because the power iteration finds the fastest decay from below.
 const SAFETY: f64 = 0.92;
-/// Steps of the power iteration.
+/// Steps of the power iteration: they found 0.973 of the fastest decay at least, of what 1000 find, in
+/// bars, plates and blocks with 6 and 18 neighbours and with 20 % jitter.
 const POWER_STEPS: usize = 40;
 
 /// Conduction of one body.
