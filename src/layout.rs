@@ -4,6 +4,8 @@
 //! one after the particles, and the unused lanes of the last slice, hold finite dummies, so that a
 //! slice can be read at any offset and a pair weight of 0 makes the dummies harmless.
 
+use std::ops::Range;
+
 use crate::lane::{SLICE, Slots};
 
 /// Shape shared by all arrays of a body.
@@ -153,6 +155,22 @@ impl<const N: usize> Array<N> {
                 })
             })
             .collect()
+    }
+    /// Some slices, counted from the first one that holds particles.
+    pub fn part(&self, slices: Range<usize>) -> [&[f64]; N] {
+        let stride = self.layout.stride();
+        std::array::from_fn(|c| {
+            let first = c * stride + 1;
+            bytemuck::must_cast_slice(&self.data[first + slices.start..first + slices.end])
+        })
+    }
+    /// The same to write.
+    pub fn part_mut(&mut self, slices: Range<usize>) -> [&mut [f64]; N] {
+        let mut components = self.data.chunks_exact_mut(self.layout.stride());
+        std::array::from_fn(|_| {
+            let component = components.next().expect("N components");
+            bytemuck::must_cast_slice_mut(&mut component[1 + slices.start..1 + slices.end])
+        })
     }
     /// Sets every slot, guards included.
     pub fn fill(&mut self, value: f64) {

@@ -3,6 +3,7 @@
 //! Slabs depend on the number of particles alone, so that every sum has the same order, and the
 //! results the same bits, whatever the number of threads.
 
+use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use rayon::prelude::*;
@@ -90,6 +91,41 @@ pub fn map_slabs<I: Send, R: Send>(
         .enumerate()
         .map(|(i, slab)| work(i, slab))
         .collect()
+}
+
+/// Scratch of each thread of a pool.
+#[derive(Debug)]
+pub struct PerThread<S>(Vec<Mutex<S>>);
+
+impl<S: Send> PerThread<S> {
+    /// For the threads of the pool that it is called in.
+    pub fn new(scratch: impl Fn() -> S) -> Self {
+        let threads = rayon::current_num_threads();
+        Self((0..threads).map(|_| Mutex::new(scratch())).collect())
+    }
+    /// As [`map_slabs`] with the scratch of the thread that the work runs on. The work must leave nothing
+    /// there for later, and calls nothing parallel.
+    pub fn map<I: Send, R: Send>(
+        &self,
+        slabs: Vec<I>,
+        work: impl Fn(&mut S, usize, I) -> R + Sync + Send,
+    ) -> Vec<R> {
+        map_slabs(slabs, |i, slab| {
+            // Another pool than that of `new` may have more threads.
+            let thread = rayon::current_thread_index().unwrap_or(0) % self.0.len();
+            // Whatever a panic left there is overwritten.
+            let mut scratch = self.0[thread]
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            work(&mut scratch, i, slab)
+        })
+    }
+    /// Sum over the threads.
+    pub fn sum(&self, of: impl Fn(&S) -> usize) -> usize {
+        let all = self.0.iter();
+        all.map(|s| of(&s.lock().unwrap_or_else(PoisonError::into_inner)))
+            .sum()
+    }
 }
 
 /// Fills a vector from its index, in parallel.

@@ -442,7 +442,11 @@ impl Simulation {
 
     /// THE time step: three stages of rates, loads, blend, supports.
     fn step(&mut self, dt: f64, end: f64) -> Result<()> {
-        self.start.copy_from(&self.state);
+        // The first stage reads the start and writes the state, but not its history.
+        std::mem::swap(&mut self.start, &mut self.state);
+        if let (Some(history), Some(start)) = (&mut self.state.history, &self.start.history) {
+            history.copy_from(start);
+        }
         let (accounts, walls) = (self.accounts, self.walls.clone());
         match self.stages(dt, end) {
             Ok(()) => {
@@ -452,7 +456,7 @@ impl Simulation {
                 Ok(())
             }
             Err(error) => {
-                self.state.copy_from(&self.start);
+                std::mem::swap(&mut self.start, &mut self.state);
                 self.accounts = accounts;
                 self.walls = walls;
                 self.evaluate()?;
@@ -482,12 +486,13 @@ impl Simulation {
         pool.install(|| {
             let diverged = |b: Breakdown, state: &State| diverged(b, state, order, end);
             let mut before = before;
-            let held = boundary.constrained_kinetic(&state.v);
+            let held = boundary.constrained_kinetic(&start.v);
             let wave_speed = url.wave_speeds().pressure;
-            boundary.approach(approach, state, walls, reference, wave_speed, (time, dt))?;
+            boundary.approach(approach, start, walls, reference, wave_speed, (time, dt))?;
             for (i, stage) in SSP_RK3.into_iter().enumerate() {
                 let stage_time = time + stage.time * dt;
                 let share = stage.weight * dt;
+                let now = if i == 0 { &*start } else { &*state };
                 if let Some(before) = &mut before {
                     if i == 0 {
                         // What an abandoned step left here must not matter, not even as 0 x NaN.
@@ -497,7 +502,7 @@ impl Simulation {
                     let density = url.law().density();
                     let power = angular_momentum::project(
                         &mut url.rates.force,
-                        state,
+                        now,
                         start,
                         before,
                         factors,
@@ -505,14 +510,13 @@ impl Simulation {
                         reference,
                     );
                     accounts.projection -= share * power;
-                    before.copy_from(&state.v);
+                    before.copy_from(&now.v);
                 }
                 let mut force = std::mem::replace(&mut url.rates.force, Array::empty());
-                let power =
-                    boundary.add_loads(&mut force, url, state, reference, stage_time, inputs);
+                let power = boundary.add_loads(&mut force, url, now, reference, stage_time, inputs);
                 url.rates.force = force;
                 accounts.external_work +=
-                    share * (power? - boundary.constrained_power(&url.rates.force, &state.v));
+                    share * (power? - boundary.constrained_power(&url.rates.force, &now.v));
                 accounts.dissipation += share * evaluation.dissipation;
                 accounts.conduction += share * evaluation.conduction;
                 if let Some(mut heat) = url.rates.heat.take() {
@@ -522,7 +526,7 @@ impl Simulation {
                     url.rates.heat = Some(heat);
                     accounts.heat_in += share * url.heat_power(power?);
                 }
-                boundary.follow(approach, i, &url.rates.force, &state.v, dt);
+                boundary.follow(approach, i, &url.rates.force, &now.v, dt);
                 url.advance_stage(state, start, reference, (stage.keep, stage.take), dt);
                 let next = SSP_RK3.get(i + 1).map_or(end, |next| time + next.time * dt);
                 boundary.constrain(&mut state.v, next, inputs)?;

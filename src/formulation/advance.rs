@@ -28,8 +28,9 @@ pub(super) struct Heating<'a> {
     pub theta: &'a [f64],
 }
 
-/// One stage of the integrator for one slab: y = keep y0 + take (y + dt dy/dt).
-pub(super) struct Advance<'a> {
+/// One stage of the integrator for one slab: y = keep y0 + take (y + dt dy/dt); of the first stage y is y0, and what
+/// stands in `out` does not matter.
+pub(super) struct Advance<'a, const FIRST: bool> {
     pub reference: &'a Reference,
     pub start: &'a State,
     pub force: [&'a [f64]; 3],
@@ -44,7 +45,7 @@ pub(super) struct Advance<'a> {
     pub out: StateSlab<'a>,
 }
 
-impl Work for Advance<'_> {
+impl<const FIRST: bool> Work for Advance<'_, FIRST> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) {
@@ -66,56 +67,53 @@ impl Work for Advance<'_> {
         let density = T::splat(token, self.density);
         for (at, a) in lanes_of::<T>(self.reference, self.slab) {
             let out = &mut self.out;
-            let x = load_slab3::<T>(token, &out.x, at);
-            let v = load_slab3::<T>(token, &out.v, at);
-            let f = load_slab9::<T>(token, &out.f, at);
+            let (start_x, start_v) = (load3::<T>(token, &x0, a), load3::<T>(token, &v0, a));
+            let start_f = load9::<T>(token, &f0, a);
+            let (mut x, mut v, mut f) = (start_x, start_v, start_f);
+            if !FIRST {
+                x = load_slab3(token, &out.x, at);
+                v = load_slab3(token, &out.v, at);
+                f = load_slab9(token, &out.f, at);
+            }
             let grad = load9::<T>(token, &self.grad_v, a);
             // Dummies have no volume and no force.
             let v_r = T::load(token, volume, a);
             let mass = density.mul_add(v_r, T::splat(token, f64::MIN_POSITIVE));
             let acceleration = scale3(T::splat(token, 1.0) / mass, load3(token, &self.force, a));
-            store3(&blend.vector(load3(token, &x0, a), x, v), &mut out.x, at);
-            store3(
-                &blend.vector(load3(token, &v0, a), v, acceleration),
-                &mut out.v,
-                at,
-            );
-            store9(
-                &blend.tensor(&load9(token, &f0, a), &f, &grad),
-                &mut out.f,
-                at,
-            );
+            store3(&blend.vector(start_x, x, v), &mut out.x, at);
+            store3(&blend.vector(start_v, v, acceleration), &mut out.v, at);
+            store9(&blend.tensor(&start_f, &f, &grad), &mut out.f, at);
             if let (Some(eta), Some(eta0), Some(heating)) = (&mut out.eta, eta0, self.heating) {
                 // V_R d eta/dt = Q/theta ([URL23] 67).
                 let theta = heating.thermal.divisor(T::load(token, heating.theta, a));
                 let capacity = v_r.mul_add(theta, T::splat(token, f64::MIN_POSITIVE));
                 let rate = T::load(token, heating.heat, a) / capacity;
-                let now = T::load(token, eta, at);
-                blend
-                    .scalar(T::load(token, eta0, a), now, rate)
-                    .store(eta, at);
+                let start = T::load(token, eta0, a);
+                let now = if FIRST {
+                    start
+                } else {
+                    T::load(token, eta, at)
+                };
+                blend.scalar(start, now, rate).store(eta, at);
             }
+            let start_h = h0.as_ref().map(|h0| load9::<T>(token, h0, a));
+            let h = match (&out.h, FIRST) {
+                (Some(h), false) => Some(load_slab9::<T>(token, h, at)),
+                _ => start_h,
+            };
             if let (Some(j), Some(j0)) = (&mut out.j, j0) {
                 // dj/dt = h : grad v (56), with h = cof f where it is not independent.
-                let h = match &out.h {
-                    Some(h) => load_slab9::<T>(token, h, at),
-                    None => cofactor(&f),
-                };
-                let mut rate = double_dot(&h, &grad);
+                let mut rate = double_dot(&h.unwrap_or_else(|| cofactor(&f)), &grad);
                 if let Some(extra) = self.j_rate {
                     rate = rate + T::load(token, extra, a);
                 }
-                let now = T::load(token, j, at);
-                blend.scalar(T::load(token, j0, a), now, rate).store(j, at);
+                let start = T::load(token, j0, a);
+                let now = if FIRST { start } else { T::load(token, j, at) };
+                blend.scalar(start, now, rate).store(j, at);
             }
-            if let (Some(h), Some(h0)) = (&mut out.h, &h0) {
+            if let (Some(out), Some(start), Some(h)) = (&mut out.h, start_h, h) {
                 // dh/dt = f x grad v (55).
-                let now = load_slab9::<T>(token, h, at);
-                store9(
-                    &blend.tensor(&load9(token, h0, a), &now, &tensor_cross(&f, &grad)),
-                    h,
-                    at,
-                );
+                store9(&blend.tensor(&start, &h, &tensor_cross(&f, &grad)), out, at);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The law pass: where formulation and material meet in one array, the stress.
 
-use super::passes::{Kinematics, PointOutput, first_breakdown, lanes_of};
+use super::passes::{Kinematics, PointOutput, first_breakdown, lanes_from, lanes_of};
 use super::url::{Breakdown, Runner, Trouble};
 use crate::lane::{Lane, PerSlot, Work, vectorised};
 use crate::material::{Deformation, Material, Thermal};
@@ -30,21 +30,22 @@ pub(super) struct LawInputs<'a> {
     pub elapsed: f64,
 }
 
-/// The law pass: stress, temperature and energy of one slab from the total deformation.
+/// The law pass: stress, temperature and energy of a run of slices from the total deformation.
 ///
 /// `FLOW` tells when the loop is compiled whether the history is mapped.
-pub(super) struct Laws<'a, 'o, M, const FLOW: bool> {
+pub(super) struct Laws<'a, 'o, 'p, M, const FLOW: bool> {
     pub law: M,
     pub inputs: LawInputs<'a>,
-    pub slab: usize,
-    pub out: &'o mut PointOutput<'a>,
+    pub run: (usize, usize),
+    pub out: &'o mut PointOutput<'p>,
 }
 
-impl<M: Material, const FLOW: bool> Work for Laws<'_, '_, M, FLOW> {
+impl<M: Material, const FLOW: bool> Work for Laws<'_, '_, '_, M, FLOW> {
     type Output = std::result::Result<Stored, Breakdown>;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> Self::Output {
-        let Self { law, out, .. } = self;
+        let Self { law, run, .. } = self;
+        let PointOutput { kept, block } = self.out;
         let LawInputs {
             kinematics,
             reference,
@@ -57,7 +58,7 @@ impl<M: Material, const FLOW: bool> Work for Laws<'_, '_, M, FLOW> {
         let mut admissible = PerSlot::new(1.0);
         let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
         let infinity = T::splat(token, f64::INFINITY);
-        for (at, a) in lanes_of::<T>(reference, self.slab) {
+        for (at, a) in lanes_from::<T>(run) {
             let total = kinematics.total::<T>(token, a);
             let v_r = T::load(token, volume, a);
             let mut history = match &self.inputs.history {
@@ -81,7 +82,7 @@ impl<M: Material, const FLOW: bool> Work for Laws<'_, '_, M, FLOW> {
                 let j = total.j;
                 good = (infinity - j).if_positive(j.if_positive(good, zero), zero);
             }
-            if let (Some((thermal, w, eta)), Some([out_theta, beta])) = (warmth, &mut out.theta) {
+            if let (Some((thermal, w, eta)), Some([out_theta, beta])) = (warmth, &mut kept.theta) {
                 thermal.couple(&total, &w, &mut stress);
                 theta.store(out_theta, at);
                 w.beta.store(beta, at);
@@ -91,19 +92,18 @@ impl<M: Material, const FLOW: bool> Work for Laws<'_, '_, M, FLOW> {
             }
             admissible.min(at, good);
             strain.add(at, v_r * stress.energy);
-            store9(&stress.p, &mut out.q, at);
-            stress.stretch.store(out.wave[0], at);
-            (density / total.j).store(out.wave[1], at);
-            if let Some(sigma_j) = &mut out.sigma_j {
+            store9(&stress.p, &mut block.q, at);
+            stress.stretch.store(block.wave[0], at);
+            (density / total.j).store(block.wave[1], at);
+            if let Some(sigma_j) = &mut kept.sigma_j {
                 stress.sigma_j.store(sigma_j, at);
             }
         }
         if admissible.least() < 1.0 {
-            let (first, _) = reference.layout.slab_range(self.slab);
-            let theta = out.theta.as_ref().map(|[theta, _]| &**theta);
-            return Err(first_breakdown(reference, self.slab, |slot| {
+            let theta = kept.theta.as_ref().map(|[theta, _]| &**theta);
+            return Err(first_breakdown(run, |slot| {
                 let total = kinematics.total::<f64>((), slot);
-                let theta = theta.map_or(1.0, |theta| theta[slot - first]);
+                let theta = theta.map_or(1.0, |theta| theta[slot - run.0]);
                 inadmissible(&total, theta)
             }));
         }
@@ -206,26 +206,26 @@ pub(super) fn flow<M: Material>(work: Flow<M>) -> Plastic {
     }
 }
 
-/// The law pass of one slab, compiled for what the body has; with `flow` a history is mapped.
-pub(super) fn stresses<'a, R: Runner, M: Material>(
+/// The law pass of a run of slices, compiled for what the body has; with `flow` a history is mapped.
+pub(super) fn stresses<R: Runner, M: Material>(
     law: M,
-    inputs: LawInputs<'a>,
+    inputs: LawInputs,
     flow: bool,
-    slab: usize,
-    out: &mut PointOutput<'a>,
+    run: (usize, usize),
+    out: &mut PointOutput,
 ) -> std::result::Result<Stored, Breakdown> {
     if M::HISTORY && flow {
         R::run(Laws::<M, true> {
             law,
             inputs,
-            slab,
+            run,
             out,
         })
     } else {
         R::run(Laws::<M, false> {
             law,
             inputs,
-            slab,
+            run,
             out,
         })
     }

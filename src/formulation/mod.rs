@@ -8,4 +8,5 @@ mod laws;
 pub mod limiter;
 mod passes;
 pub mod riemann;
+mod sweep;
 pub mod url;

@@ -1,8 +1,11 @@
-//! The passes of [`super::url`] over one slab, written once over lanes.
+//! The passes of [`super::url`] over a run of slices, written once over lanes.
+
+use std::ops::Range;
 
 use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
-use super::url::{Breakdown, Scratch, State, Trouble};
+use super::sweep::{Block, BlockPart};
+use super::url::{Breakdown, State, Trouble};
 use crate::lane::{Lane, PerSlot, SLICE, Work};
 use crate::layout::{Array, Layout, level};
 use crate::material::Deformation;
@@ -81,9 +84,11 @@ pub(super) fn lanes_of<T: Lane>(
     lanes_from::<T>(reference.layout.slab_range(slab))
 }
 
-/// The same of any piece.
+/// The same of a run of slices: its first slot, and how many they are.
 #[inline(always)]
-fn lanes_from<T: Lane>((first, slices): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
+pub(super) fn lanes_from<T: Lane>(
+    (first, slices): (usize, usize),
+) -> impl Iterator<Item = (usize, usize)> {
     std::iter::zip(
         (0..slices * SLICE).step_by(T::WIDTH),
         (first..).step_by(T::WIDTH),
@@ -91,22 +96,22 @@ fn lanes_from<T: Lane>((first, slices): (usize, usize)) -> impl Iterator<Item = 
 }
 
 /// Gradient of a vector field with respect to the reference (54).
-pub(super) struct Gradient<'a, 'o, P> {
+pub(super) struct Gradient<'a, 'o, 'p, P> {
     pub pairs: P,
     pub reference: &'a Reference,
     pub field: [&'a [f64]; 3],
-    pub slab: usize,
-    pub out: &'o mut [&'a mut [f64]; 9],
+    pub run: (usize, usize),
+    pub out: &'o mut [&'p mut [f64]; 9],
 }
 
-impl<P: PairVectors> Work for Gradient<'_, '_, P> {
+impl<P: PairVectors> Work for Gradient<'_, '_, '_, P> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
         let l = self.reference.l.components();
         let slots = l[0].len();
         let (pairs, field) = (self.pairs.level(slots), level(self.field, slots));
-        for (at, a) in lanes_of::<T>(self.reference, self.slab) {
+        for (at, a) in lanes_from::<T>(self.run) {
             let centre = pairs.centre::<T>(token, a);
             let own = load3::<T>(token, &field, a);
             let mut sum = [zero3(token); 3];
@@ -119,33 +124,50 @@ impl<P: PairVectors> Work for Gradient<'_, '_, P> {
     }
 }
 
-/// Output of the gradient, law and point passes for one slab.
-pub(super) struct PointOutput<'a> {
+/// What the gradient, law and point passes leave for later, of a run of slices.
+pub(super) struct Kept<'a> {
     pub grad_v: [&'a mut [f64]; 9],
-    /// P from the law pass, where formulation and material meet; Q from the point pass.
-    pub q: [&'a mut [f64]; 9],
-    pub s: Option<[&'a mut [f64]; 9]>,
-    pub half_grad: Option<[&'a mut [f64]; 9]>,
-    pub wave: [&'a mut [f64]; 2],
     pub sigma_j: Option<&'a mut [f64]>,
     /// Temperature and the variable whose gradient drives conduction.
     pub theta: Option<[&'a mut [f64]; 2]>,
 }
 
+impl Kept<'_> {
+    /// Some of the slices.
+    pub fn part(&mut self, slices: Range<usize>) -> Kept<'_> {
+        let range = slices.start * SLICE..slices.end * SLICE;
+        Kept {
+            grad_v: self.grad_v.each_mut().map(|c| &mut c[range.clone()]),
+            sigma_j: self.sigma_j.as_mut().map(|s| &mut s[range.clone()]),
+            theta: self
+                .theta
+                .as_mut()
+                .map(|t| t.each_mut().map(|c| &mut c[range.clone()])),
+        }
+    }
+}
+
+/// Output of the gradient, law and point passes for a run of slices.
+pub(super) struct PointOutput<'a> {
+    pub kept: Kept<'a>,
+    /// As Q, P from the law pass, where formulation and material meet; Q from the point pass.
+    pub block: BlockPart<'a>,
+}
+
 /// The rest of one particle that its neighbours need, from the incremental deformation; kinetic
-/// energy of the slab.
-pub(super) struct Points<'a, 'o> {
+/// energy of the run.
+pub(super) struct Points<'a, 'o, 'p> {
     pub density: f64,
     pub kinematics: Kinematics<'a>,
     pub reference: &'a Reference,
     pub v: [&'a [f64]; 3],
     /// Spacing tensors ([`spacings`]), where they bound the step.
     pub spacing: Option<[&'a [f64]; 6]>,
-    pub slab: usize,
-    pub out: &'o mut PointOutput<'a>,
+    pub run: (usize, usize),
+    pub out: &'o mut PointOutput<'p>,
 }
 
-/// What the point pass sums over a slab.
+/// What the point pass sums over a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
     /// Kinetic energy [J].
@@ -154,7 +176,7 @@ pub(super) struct Motion {
     pub length2: f64,
 }
 
-impl Work for Points<'_, '_> {
+impl Work for Points<'_, '_, '_> {
     type Output = std::result::Result<Motion, Breakdown>;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> Self::Output {
@@ -163,10 +185,11 @@ impl Work for Points<'_, '_> {
             reference,
             v,
             spacing,
-            slab,
+            run,
             out,
             ..
         } = self;
+        let PointOutput { kept, block } = out;
         let (l, volume) = (reference.l.components(), reference.volume.components()[0]);
         let density = T::splat(token, self.density);
         let half = T::splat(token, 0.5);
@@ -175,15 +198,15 @@ impl Work for Points<'_, '_> {
         let mut admissible = PerSlot::new(1.0);
         let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
         let infinity = T::splat(token, f64::INFINITY);
-        for (at, a) in lanes_of::<T>(reference, slab) {
+        for (at, a) in lanes_from::<T>(run) {
             let (l, v_r) = (load9::<T>(token, &l, a), T::load(token, volume, a));
 
             // 1/2 grad_chi v f^-1, f^-1 from f itself.
             let f = load9::<T>(token, &kinematics.f, a);
             let cof_f = cofactor(&f);
-            if let Some(half_grad) = &mut out.half_grad {
+            if let Some(half_grad) = &mut block.half_grad {
                 let factor = half / dot(f[0], cof_f[0]);
-                let grad = load_slab9::<T>(token, &out.grad_v, at);
+                let grad = load_slab9::<T>(token, &kept.grad_v, at);
                 store9(&scale9(factor, &mat_mul_t(&grad, &cof_f)), half_grad, at);
             }
 
@@ -194,9 +217,9 @@ impl Work for Points<'_, '_> {
                 k = mat_mul(&transpose(&load9(token, f_chi, a)), &k);
                 v_chi = v_r * T::load(token, j_chi, a);
             }
-            let p = load_slab9::<T>(token, &out.q, at);
-            store9(&mat_mul(&p, &k), &mut out.q, at);
-            if let Some(out) = &mut out.s {
+            let p = load_slab9::<T>(token, &block.q, at);
+            store9(&mat_mul(&p, &k), &mut block.q, at);
+            if let Some(out) = &mut block.s {
                 let h = match &kinematics.h {
                     Some(h) => load9(token, h, a),
                     None => cof_f,
@@ -212,13 +235,13 @@ impl Work for Points<'_, '_> {
 
             if let Some(spacing) = &spacing {
                 let n = std::array::from_fn(|c| T::load(token, spacing[c], a));
-                let stretch = T::load(token, out.wave[0], at);
+                let stretch = T::load(token, block.wave[0], at);
                 let length2 = bounded_length2(&kinematics.total(token, a).f, &n, stretch);
                 shortest.min(at, v_r.if_positive(length2, infinity));
             }
         }
         if admissible.least() < 1.0 {
-            return Err(first_breakdown(reference, slab, |slot| {
+            return Err(first_breakdown(run, |slot| {
                 immovable(load3((), &v, slot), self.density * volume[slot])
             }));
         }
@@ -277,21 +300,19 @@ pub(super) fn spacings(reference: &Reference) -> Array<6> {
     spacings
 }
 
-/// The first particle of a slab that is in trouble.
+/// The first particle of a run that is in trouble.
 #[cold]
 pub(super) fn first_breakdown(
-    reference: &Reference,
-    slab: usize,
+    run: (usize, usize),
     trouble: impl Fn(usize) -> Option<Trouble>,
 ) -> Breakdown {
-    let (first, _) = reference.layout.slab_range(slab);
-    lanes_of::<f64>(reference, slab)
+    lanes_from::<f64>(run)
         .find_map(|(_, slot)| {
             let trouble = trouble(slot)?;
             Some(Breakdown { slot, trouble })
         })
         .unwrap_or(Breakdown {
-            slot: first,
+            slot: run.0,
             trouble: Trouble::VolumeRatio(f64::NAN),
         })
 }
@@ -302,20 +323,20 @@ pub(super) fn immovable(v: Vec3<f64>, mass: f64) -> Option<Trouble> {
 }
 
 /// Scales the gradients for the reconstruction by Venkatakrishnan's limiter.
-pub(super) struct Limit<'a> {
+pub(super) struct Limit<'a, 'o, 'p> {
     pub reference: &'a Reference,
     pub x: [&'a [f64]; 3],
     pub v: [&'a [f64]; 3],
-    pub slab: usize,
-    pub half_grad: [&'a mut [f64]; 9],
+    pub run: (usize, usize),
+    pub half_grad: &'o mut [&'p mut [f64]; 9],
 }
 
-impl Work for Limit<'_> {
+impl Work for Limit<'_, '_, '_> {
     type Output = ();
     #[inline(always)]
-    fn run<T: Lane>(mut self, token: T::Token) {
+    fn run<T: Lane>(self, token: T::Token) {
         let weights = self.reference.slices.weights();
-        for (at, a) in lanes_of::<T>(self.reference, self.slab) {
+        for (at, a) in lanes_from::<T>(self.run) {
             let (xa, va) = (load3::<T>(token, &self.x, a), load3::<T>(token, &self.v, a));
             let (mut rise, mut fall) = (zero3::<T>(token), zero3::<T>(token));
             for (b, pair) in self.reference.slices.of(a) {
@@ -326,7 +347,7 @@ impl Work for Limit<'_> {
                     fall[c] = mask.if_positive(fall[c].min(dv[c]), fall[c]);
                 }
             }
-            let mut grad = load_slab9::<T>(token, &self.half_grad, at);
+            let mut grad = load_slab9::<T>(token, self.half_grad, at);
             let mut phi = [T::splat(token, 1.0); 3];
             for (b, pair) in self.reference.slices.of(a) {
                 let mask = T::load(token, weights, pair);
@@ -339,7 +360,7 @@ impl Work for Limit<'_> {
             for c in 0..3 {
                 grad[c] = scale3(phi[c], grad[c]);
             }
-            store9(&grad, &mut self.half_grad, at);
+            store9(&grad, self.half_grad, at);
         }
     }
 }
@@ -354,21 +375,29 @@ pub(super) struct ForceInput<'a> {
     s: [&'a [f64]; 9],
     half_grad: [&'a [f64]; 9],
     wave: [&'a [f64]; 2],
+    /// What is taken off a slot for its place in q, s, half_grad and wave.
+    base: usize,
 }
 
 impl<'a> ForceInput<'a> {
-    pub(super) fn new(state: &'a State, reference: &'a Reference, scratch: &'a Scratch) -> Self {
+    /// Of the particles of a block that begins `slices` slices after the body.
+    pub(super) fn new(
+        state: &'a State,
+        reference: &'a Reference,
+        block: &'a Block,
+        slices: usize,
+    ) -> Self {
+        let tensors =
+            |array: &'a Option<Array<9>>| array.as_ref().map_or([&[][..]; 9], Array::components);
         Self {
             reference,
             x: state.x.components(),
             v: state.v.components(),
-            q: scratch.q.components(),
-            s: scratch.s.as_ref().map_or([&[]; 9], Array::components),
-            half_grad: scratch
-                .half_grad
-                .as_ref()
-                .map_or([&[]; 9], Array::components),
-            wave: scratch.wave.components(),
+            q: block.q.components(),
+            s: tensors(&block.s),
+            half_grad: tensors(&block.half_grad),
+            wave: block.wave.components(),
+            base: slices * SLICE,
         }
     }
 
@@ -376,19 +405,19 @@ impl<'a> ForceInput<'a> {
     /// an index serves them all.
     #[inline(always)]
     pub(super) fn level<P: PairVectors, const MODE: u8>(self, pairs: P) -> (Self, P) {
-        let slots = self.x[0].len();
+        let (slots, places) = (self.x[0].len(), self.q[0].len());
         let mut this = Self {
             x: level(self.x, slots),
             v: level(self.v, slots),
-            q: level(self.q, slots),
-            wave: level(self.wave, slots),
+            q: level(self.q, places),
+            wave: level(self.wave, places),
             ..self
         };
         if MODE != riemann::OFF {
-            this.s = level(self.s, slots);
+            this.s = level(self.s, places);
         }
         if riemann::reconstructs(MODE) {
-            this.half_grad = level(self.half_grad, slots);
+            this.half_grad = level(self.half_grad, places);
         }
         (this, pairs.level(slots))
     }
@@ -399,10 +428,22 @@ impl<'a> ForceInput<'a> {
         load3(token, &self.x, a)
     }
 
+    /// Q_a.
+    #[inline(always)]
+    fn stress<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
+        load9(token, &self.q, a - self.base)
+    }
+
+    /// Half the velocity gradient.
+    #[inline(always)]
+    fn half_grad<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
+        load9(token, &self.half_grad, a - self.base)
+    }
+
     /// S_a.
     #[inline(always)]
     pub(super) fn area<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
-        load9(token, &self.s, a)
+        load9(token, &self.s, a - self.base)
     }
 
     /// c_ab [m^2], from S_a and the pair vectors.
@@ -422,8 +463,8 @@ impl<'a> ForceInput<'a> {
         Here {
             x: load3(token, &self.x, a),
             v: load3(token, &self.v, a),
-            stretch: T::load(token, self.wave[0], a),
-            density: T::load(token, self.wave[1], a),
+            stretch: T::load(token, self.wave[0], a - self.base),
+            density: T::load(token, self.wave[1], a - self.base),
         }
     }
 
@@ -436,16 +477,16 @@ impl<'a> ForceInput<'a> {
         a: usize,
     ) -> Vec3<f64> {
         let (here, centre) = (self.here((), a), pairs.centre::<f64>((), a));
-        let (qa, sa) = (load9((), &self.q, a), self.area((), a));
-        let grad_a = load9((), &self.half_grad, a);
+        let (qa, sa) = (self.stress((), a), self.area((), a));
+        let grad_a = self.half_grad((), a);
         let mut force = [0.0; 3];
         for (b, pair) in self.reference.slices.of(a) {
             let (g, back) = pairs.pair((), &centre, b, pair);
             let mut p = self.pair(&here, b);
             p.area = self.pair_area(&sa, b, (g, back));
-            let grad_b = load9((), &self.half_grad, b);
+            let grad_b = self.half_grad((), b);
             let jump = riemann::jump::<f64, { riemann::LINEAR }>(&p, &grad_a, &grad_b, 0.0);
-            let stress = sub3(mat_vec(&qa, g), mat_vec(&load9((), &self.q, b), back));
+            let stress = sub3(mat_vec(&qa, g), mat_vec(&self.stress((), b), back));
             force = add3(force, add3(stress, riemann::dissipation(&p, jump, speeds)));
         }
         force
@@ -461,8 +502,8 @@ impl<'a> ForceInput<'a> {
             dx,
             dv: sub3(load3(token, &self.v, b), here.v),
             dx2: dot(dx, dx),
-            stretch: half * (here.stretch + T::load(token, self.wave[0], b)),
-            density: half * (here.density + T::load(token, self.wave[1], b)),
+            stretch: half * (here.stretch + T::load(token, self.wave[0], b - self.base)),
+            density: half * (here.density + T::load(token, self.wave[1], b - self.base)),
             area: zero3(token),
         }
     }
@@ -523,11 +564,11 @@ impl<T: Lane> Areas<T> {
     }
 }
 
-/// T_a (57) of the particles of one piece, from the pairs whose first particle lies in it; (power of the
+/// Adds to T_a (57) what the pairs whose first particle lies in a run of slices give; (power of the
 /// dissipation, smallest squared |x_ab| lambda_ab) of these pairs.
 ///
 /// Each pair is computed once, for both of its particles: what it does to the second is taken off there.
-pub(super) struct Forces<'a, P, const MODE: u8> {
+pub(super) struct Forces<'a, 'o, 'p, P, const MODE: u8> {
     pub pairs: P,
     pub input: ForceInput<'a>,
     pub speeds: WaveSpeeds<f64>,
@@ -535,14 +576,15 @@ pub(super) struct Forces<'a, P, const MODE: u8> {
     pub coefficient: f64,
     /// What makes up for that share in a shock, 0 without a limiter of shocks.
     pub shock: f64,
-    /// First slot and number of slices.
-    pub piece: (usize, usize),
-    pub out: [&'a mut [f64]; 3],
-    /// The same for the particles behind the piece.
-    pub behind: [&'a mut [f64]; 3],
+    pub run: (usize, usize),
+    /// Forces on the chunk that the run is part of, and where it begins there.
+    pub out: &'o mut [&'p mut [f64]; 3],
+    pub from: usize,
+    /// The same for the particles behind the chunk.
+    pub behind: &'o mut [&'p mut [f64]; 3],
 }
 
-impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
+impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
     type Output = (f64, f64);
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> (f64, f64) {
@@ -552,9 +594,10 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
             speeds,
             coefficient,
             shock,
-            piece,
-            mut out,
-            mut behind,
+            run,
+            out,
+            from,
+            behind,
         } = self;
         let (input, pairs) = input.level::<P, MODE>(pairs);
         let slices = &input.reference.slices;
@@ -566,19 +609,17 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
         let full = T::splat(token, shock);
         let far = T::splat(token, f64::INFINITY);
         let (mut power, mut shortest) = (PerSlot::new(0.0), PerSlot::new(f64::INFINITY));
-        for values in out.iter_mut().chain(&mut behind) {
-            values.fill(0.0);
-        }
-        for (at, a) in lanes_from::<T>(piece) {
+        for (place, a) in lanes_from::<T>(run) {
+            let at = from + place;
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
-            let qa = load9::<T>(token, &input.q, a);
+            let qa = input.stress::<T>(token, a);
             let (mut sa, mut grad_a) = ([zero3(token); 3], [zero3(token); 3]);
             if MODE != riemann::OFF {
                 sa = input.area::<T>(token, a);
             }
             if riemann::reconstructs(MODE) {
-                grad_a = load9::<T>(token, &input.half_grad, a);
+                grad_a = input.half_grad::<T>(token, a);
             }
             let mut force = zero3::<T>(token);
             let mut work = T::splat(token, 0.0);
@@ -588,11 +629,11 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                 let mut p = input.pair(&here, b);
                 let mask = T::load(token, weights, pair);
                 length2 = length2.min(mask.if_positive(p.dx2 * (p.stretch * p.stretch), far));
-                let mut f = sub3(mat_vec(&qa, g), mat_vec(&load9(token, &input.q, b), back));
+                let mut f = sub3(mat_vec(&qa, g), mat_vec(&input.stress(token, b), back));
                 if MODE != riemann::OFF {
                     p.area = input.pair_area(&sa, b, (g, back));
                     let grad_b = if riemann::reconstructs(MODE) {
-                        load9(token, &input.half_grad, b)
+                        input.half_grad(token, b)
                     } else {
                         [zero3(token); 3]
                     };
@@ -605,10 +646,10 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
                     f = add3(f, d);
                 }
                 force = add3(force, f);
-                take_off(f, &mut out, &mut behind, at + (b - a));
+                take_off(f, out, behind, at + (b - a));
             }
             // Only now: a pair within the lanes has changed what stands here.
-            store3(&add3(load_slab3(token, &out, at), force), &mut out, at);
+            store3(&add3(load_slab3(token, out, at), force), out, at);
             power.add(at, work);
             shortest.min(at, length2);
         }
@@ -616,27 +657,27 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, P, MODE> {
     }
 }
 
-/// Takes a vector off what stands at a place of a piece, or behind its end.
+/// Takes a vector off what stands at a place of a chunk, or behind its end.
 #[inline(always)]
 fn take_off<T: Lane>(
     value: Vec3<T>,
-    piece: &mut [&mut [f64]; 3],
+    chunk: &mut [&mut [f64]; 3],
     behind: &mut [&mut [f64]; 3],
     at: usize,
 ) {
-    let end = piece[0].len();
+    let end = chunk[0].len();
     let token = value[0].token();
     let within = |to: &mut [&mut [f64]; 3], at: usize| {
         store3(&sub3(load_slab3(token, to, at), value), to, at);
     };
     if at + T::WIDTH <= end {
-        within(piece, at);
+        within(chunk, at);
     } else if at >= end {
         within(behind, at - end);
     } else {
         for c in 0..3 {
             value[c].for_lanes(|lane, v| match (at + lane).checked_sub(end) {
-                None => piece[c][at + lane] -= v,
+                None => chunk[c][at + lane] -= v,
                 Some(at) => behind[c][at] -= v,
             });
         }

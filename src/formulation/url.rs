@@ -12,13 +12,14 @@
 
 use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
-use super::laws::{LawInputs, Stored, inadmissible, stresses};
+use super::laws::{LawInputs, inadmissible};
 use super::passes::{
-    AreaLengths, Bound, BoundSlope, ForceInput, Forces, Gradient, HalfSlope, Kinematics, Limit,
-    Motion, PointOutput, Points, VolumeRates, immovable, spacings,
+    AreaLengths, BoundSlope, ForceInput, Gradient, HalfSlope, Kinematics, VolumeRates, immovable,
+    spacings,
 };
 use super::riemann::{self, WaveSpeeds};
-use crate::lane::{Lane, SLICE, Slots, Work, vectorised};
+use super::sweep::{Needs, Outputs, Passes, Sweep};
+use crate::lane::{Lane, SLICE, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::material::{Deformation, History, Law, Material, Point, Thermal, VIRGIN, with_law};
 use crate::math::*;
@@ -61,54 +62,13 @@ pub struct Rates {
     pub heat: Option<Array<1>>,
 }
 
-/// Per-particle quantities that neighbours read in the force pass; recomputed in every evaluation.
+/// What passes over all neighbours read of the particles; recomputed in every evaluation.
 #[derive(Debug)]
 pub(super) struct Scratch {
-    /// Q_a.
-    pub q: Array<9>,
-    /// S_a; only where a dissipation is on.
-    pub s: Option<Array<9>>,
-    /// Half the spatial velocity gradient, 1/2 grad_chi v f^-1, limited if a limiter is on [1/s].
-    pub half_grad: Option<Array<9>>,
-    /// (smallest stretch, spatial density).
-    pub wave: Array<2>,
     /// Sigma_J [Pa] and half its spatial gradient [Pa/m]; only where D^j is on.
     sigma_j: Option<(Array<1>, Array<3>)>,
     /// Temperature [K] and conduction variable; only of a body with heat.
     pub theta: Option<Array<2>>,
-}
-
-/// What the pairs of the force pass do across the ends of its pieces: kept apart and added afterwards, so
-/// that no pair is computed twice and the sums have one order for any number of threads.
-#[derive(Debug)]
-struct Across {
-    /// Slices of a piece: at least the reach.
-    each: usize,
-    /// Slices behind a piece that its pairs reach, at most.
-    reach: usize,
-    /// Force [N] on the particles behind each piece: components, one after the other.
-    force: Vec<Slots>,
-}
-
-impl Across {
-    fn new(reference: &Reference) -> Self {
-        let layout = reference.layout;
-        let reach = reference.slices.reach();
-        let each = reach.max(layout.slab);
-        let pieces = layout.slices.div_ceil(each);
-        Self {
-            each,
-            reach,
-            force: vec![Slots([0.0; SLICE]); pieces * 3 * reach],
-        }
-    }
-}
-
-/// The three components that follow each other.
-fn split3(all: &mut [Slots]) -> [&mut [f64]; 3] {
-    let (x, rest) = all.split_at_mut(all.len() / 3);
-    let (y, z) = rest.split_at_mut(x.len());
-    [x, y, z].map(bytemuck::must_cast_slice_mut)
 }
 
 /// Sums over the body and what an evaluation found, in a fixed order.
@@ -130,6 +90,41 @@ pub struct Evaluation {
     pub length: f64,
     /// Longest time for which explicit conduction is stable [s].
     pub conduction_step: f64,
+}
+
+impl Evaluation {
+    /// Of no particles.
+    pub(super) const NONE: Self = Self {
+        kinetic: 0.0,
+        strain: 0.0,
+        thermal: 0.0,
+        entropy: 0.0,
+        conduction: 0.0,
+        dissipation: 0.0,
+        length: f64::INFINITY,
+        conduction_step: f64::INFINITY,
+    };
+
+    /// Takes in what was found of other particles.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.kinetic += other.kinetic;
+        self.strain += other.strain;
+        self.thermal += other.thermal;
+        self.entropy += other.entropy;
+        self.conduction += other.conduction;
+        self.dissipation += other.dissipation;
+        self.length = self.length.min(other.length);
+        self.conduction_step = self.conduction_step.min(other.conduction_step);
+    }
+
+    /// All in their order, or the first that failed.
+    pub(super) fn sum<E>(parts: impl IntoIterator<Item = Result<Self, E>>) -> Result<Self, E> {
+        let mut total = Self::NONE;
+        for part in parts {
+            total.add(&part?);
+        }
+        Ok(total)
+    }
 }
 
 /// A particle at which the solution broke down.
@@ -184,7 +179,7 @@ pub struct Url {
     law: Law,
     pub(super) options: Options,
     pub(super) scratch: Scratch,
-    across: Across,
+    sweep: Sweep,
     conduction: Option<Conduction>,
     /// Spacing tensors [m^-2], initial; only of a law that flows, with kernels on a lattice. Elsewhere
     /// the stretch of the law or the areas of the pairs see to the same.
@@ -281,14 +276,17 @@ impl Url {
                 thermal,
             },
             scratch: Scratch {
-                q: Array::new(layout, [0.0; 9]),
-                s: areas.then(|| Array::new(layout, [0.0; 9])),
-                half_grad: riemann::reconstructs(mode).then(|| Array::new(layout, [0.0; 9])),
-                wave: Array::new(layout, [1.0; 2]),
                 sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
                 theta: thermal.map(|_| Array::new(layout, [1.0; 2])),
             },
-            across: Across::new(reference),
+            sweep: Sweep::new(
+                reference,
+                Needs {
+                    areas,
+                    gradients: riemann::reconstructs(mode),
+                    whole: volume || bound || conduction.is_some(),
+                },
+            ),
             conduction: conduction.map(|thermal| Conduction::new(layout, thermal)),
             spacing: (law.has_history() && !bound).then(|| spacings(reference)),
             rates: Rates {
@@ -352,39 +350,8 @@ impl Url {
         reference: &Reference,
         elapsed: Option<f64>,
     ) -> std::result::Result<Evaluation, Breakdown> {
-        let mut total = Evaluation {
-            length: f64::INFINITY,
-            conduction_step: f64::INFINITY,
-            ..Evaluation::default()
-        };
-        for point in self.points::<R>(state, reference, elapsed) {
-            let (stored, motion) = point?;
-            total.length = total.length.min(motion.length2);
-            total.strain += stored.strain;
-            total.thermal += stored.thermal;
-            total.entropy += stored.entropy;
-            total.kinetic += motion.kinetic;
-        }
-        if self.options.venkatakrishnan
-            && let Some(half_grad) = &mut self.scratch.half_grad
-        {
-            let (x, v) = (state.x.components(), state.v.components());
-            parallel::map_slabs(half_grad.slabs_mut(), |slab, half_grad| {
-                R::run(Limit {
-                    reference,
-                    x,
-                    v,
-                    slab,
-                    half_grad,
-                });
-            });
-        }
-        self.bound::<R>(state, reference);
         let mode = self.options.mode;
-        for (dissipation, length2) in self.forces::<R>(state, reference, mode) {
-            total.dissipation += dissipation;
-            total.length = total.length.min(length2);
-        }
+        let mut total = self.sweep::<R>(state, reference, elapsed, mode)?;
         // Only the last evaluation of a step bounds the next one.
         if elapsed.is_none() && reference.is_bound_by_areas() {
             total.length = total.length.min(self.area_length2::<R>(state, reference));
@@ -396,16 +363,20 @@ impl Url {
         let gain = -total.dissipation * total.length;
         let round_off = ROUND_OFF * total.kinetic * self.wave_speeds().pressure;
         if matches!(mode, riemann::LINEAR | riemann::SHOCK) && gain > round_off {
-            let guarded = self.forces::<R>(state, reference, riemann::GUARDED);
-            total.dissipation = guarded.iter().map(|(dissipation, _)| dissipation).sum();
+            let guarded = self.sweep::<R>(state, reference, elapsed, riemann::GUARDED)?;
+            total.dissipation = guarded.dissipation;
         }
         if self.scratch.sigma_j.is_some() {
             total.dissipation += self.volume_rates::<R>(state, reference);
         }
         if let Some(heat) = &mut self.rates.heat {
-            let input = ForceInput::new(state, reference, &self.scratch);
-            match (&mut self.conduction, &self.scratch.theta) {
-                (Some(conduction), Some(theta)) => {
+            match (
+                &mut self.conduction,
+                &self.scratch.theta,
+                self.sweep.whole(),
+            ) {
+                (Some(conduction), Some(theta), Some(block)) => {
+                    let input = ForceInput::new(state, reference, block, 0);
                     let kinematics = Kinematics::new(state, reference);
                     (total.conduction, total.conduction_step) =
                         conduction.rates::<R>(&input, &kinematics, theta, heat);
@@ -424,162 +395,73 @@ impl Url {
     /// Sees to it that the steps of conduction are stable, from the evaluation of a body's first state; the
     /// rates have to be evaluated again.
     pub fn calibrate_conduction(&mut self, state: &State, reference: &Reference) {
-        if let (Some(conduction), Some(heat)) = (&mut self.conduction, &mut self.rates.heat) {
-            let input = ForceInput::new(state, reference, &self.scratch);
+        if let (Some(conduction), Some(heat), Some(block)) = (
+            &mut self.conduction,
+            &mut self.rates.heat,
+            self.sweep.whole(),
+        ) {
+            let input = ForceInput::new(state, reference, block, 0);
             let kinematics = Kinematics::new(state, reference);
             conduction.calibrate::<Vectors>(&input, &kinematics, heat);
         }
     }
 
-    /// Gradient, law and point passes; what is stored and how it moves, by slab.
-    fn points<R: Runner>(
+    /// Gradient, law, point and force passes; the length is still squared.
+    fn sweep<R: Runner>(
         &mut self,
         state: &State,
         reference: &Reference,
         elapsed: Option<f64>,
-    ) -> Vec<std::result::Result<(Stored, Motion), Breakdown>> {
+        mode: u8,
+    ) -> std::result::Result<Evaluation, Breakdown> {
+        let speeds = self.wave_speeds();
         let Self {
             law,
             options,
             scratch,
-            rates,
+            sweep,
             spacing,
+            rates,
             ..
         } = self;
-        let spacing = spacing.as_ref().map(Array::components);
-        let v = state.v.components();
-        let kinematics = Kinematics::new(state, reference);
-        let density = law.density();
         let heat = state.eta.as_ref().zip(options.thermal);
         let inputs = LawInputs {
-            kinematics,
+            kinematics: Kinematics::new(state, reference),
             reference,
             heat: heat.map(|(eta, thermal)| (eta.components()[0], thermal)),
             history: state.history.as_ref().map(Array::components),
             elapsed: elapsed.unwrap_or(0.0),
         };
-        let mut s = scratch.s.as_mut().map(|s| s.slabs_mut().into_iter());
-        let mut half_grad = scratch
-            .half_grad
-            .as_mut()
-            .map(|h| h.slabs_mut().into_iter());
-        let mut sigma_j = scratch
-            .sigma_j
-            .as_mut()
-            .map(|(s, _)| s.slabs_mut().into_iter());
-        let mut theta = scratch.theta.as_mut().map(|t| t.slabs_mut().into_iter());
-        let slabs: Vec<_> = rates
-            .grad_v
-            .slabs_mut()
-            .into_iter()
-            .zip(scratch.q.slabs_mut())
-            .zip(scratch.wave.slabs_mut())
-            .map(|((grad_v, q), wave)| PointOutput {
-                grad_v,
-                q,
-                s: s.as_mut().and_then(Iterator::next),
-                half_grad: half_grad.as_mut().and_then(Iterator::next),
-                wave,
-                sigma_j: sigma_j.as_mut().and_then(Iterator::next).map(|[s]| s),
-                theta: theta.as_mut().and_then(Iterator::next),
-            })
-            .collect();
-        let law = *law;
-        parallel::map_slabs(slabs, |slab, mut out| {
-            gradient::<R>(reference, v, slab, &mut out.grad_v);
-            let stored = with_law!(law, law => {
-                stresses::<R, _>(law, inputs, elapsed.is_some(), slab, &mut out)
-            })?;
-            let motion = R::run(Points {
-                density,
-                kinematics,
-                reference,
-                v,
-                spacing,
-                slab,
-                out: &mut out,
-            })?;
-            Ok((stored, motion))
-        })
-    }
-
-    /// Sees to it that operators which are no least-squares fit dissipate.
-    fn bound<R: Runner>(&mut self, state: &State, reference: &Reference) {
-        let Pairs::Closed(pairs) = reference.pair_vectors() else {
-            return;
+        let passes = Passes {
+            law: *law,
+            inputs,
+            flow: elapsed.is_some(),
+            state,
+            reference,
+            spacing: spacing.as_ref().map(Array::components),
+            limited: options.venkatakrishnan,
+            mode,
+            speeds,
+            coefficient: options.coefficient,
+            shock: match options.mode {
+                riemann::SHOCK => 1.0 / options.coefficient,
+                _ => 0.0,
+            },
         };
-        let Some(mut half_grad) = self.scratch.half_grad.take() else {
-            return;
+        let outputs = Outputs {
+            grad_v: &mut rates.grad_v,
+            sigma_j: scratch.sigma_j.as_mut().map(|(sigma_j, _)| sigma_j),
+            theta: scratch.theta.as_mut(),
         };
-        let speeds = self.wave_speeds();
-        let input = ForceInput::new(state, reference, &self.scratch);
-        parallel::map_slabs(half_grad.slabs_mut(), |slab, half_grad| {
-            R::run(Bound {
-                pairs,
-                input,
-                speeds,
-                slab,
-                half_grad,
-            });
-        });
-        self.scratch.half_grad = Some(half_grad);
-    }
-
-    /// Force pass; power of the dissipation and squared length by piece.
-    fn forces<R: Runner>(
-        &mut self,
-        state: &State,
-        reference: &Reference,
-        mode: u8,
-    ) -> Vec<(f64, f64)> {
-        let speeds = self.wave_speeds();
-        let Self {
-            options,
-            scratch,
-            rates,
-            across,
-            ..
-        } = self;
-        let coefficient = options.coefficient;
-        let shock = match options.mode {
-            riemann::SHOCK => 1.0 / coefficient,
-            _ => 0.0,
-        };
-        let input = ForceInput::new(state, reference, scratch);
-        let Across { each, reach, force } = across;
-        let pieces = rates.force.pieces_mut(*each).into_iter();
-        let pieces = pieces.zip(force.chunks_mut(3 * *reach)).collect();
-        let found = parallel::map_slabs(pieces, |index, (out, behind)| {
-            let piece = reference.layout.piece_range(index, *each);
-            let behind = split3(behind);
-            macro_rules! forces {
-                ($pairs:expr, $($mode:ident),*) => {
-                    match mode {
-                        $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
-                            pairs: $pairs, input, speeds, coefficient, shock, piece, out, behind,
-                        }),)*
-                        _ => unreachable!("six modes"),
-                    }
-                };
-            }
-            with_pairs!(reference, pairs => forces!(
-                pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF, GUARDED
-            ))
-        });
-        // A piece is no shorter than the reach: what lies behind it is in the next one.
-        let pieces = rates.force.pieces_mut(*each).into_iter().skip(1);
-        let pieces = pieces.zip(force.chunks_mut(3 * *reach)).collect();
-        parallel::map_slabs(pieces, |_, (out, before)| {
-            for (out, before) in out.into_iter().zip(split3(before)) {
-                out.iter_mut().zip(before).for_each(|(f, b)| *f += *b);
-            }
-        });
-        found
+        sweep.run::<R>(passes, outputs, &mut rates.force)
     }
 
     /// Smallest squared length that the areas of the pairs allow.
     fn area_length2<R: Runner>(&self, state: &State, reference: &Reference) -> f64 {
-        let input = ForceInput::new(state, reference, &self.scratch);
+        let Some(block) = self.sweep.whole() else {
+            return f64::INFINITY;
+        };
+        let input = ForceInput::new(state, reference, block, 0);
         let density = self.law.density();
         let slabs = vec![(); reference.layout.slabs()];
         let found = parallel::map_slabs(
@@ -595,12 +477,15 @@ impl Url {
         let Self {
             options,
             scratch,
+            sweep,
             rates,
             ..
         } = self;
-        let (Some((sigma_j, mut half_slope)), Some(out)) =
-            (scratch.sigma_j.take(), rates.j_dissipation.as_mut())
-        else {
+        let (Some((sigma_j, mut half_slope)), Some(out), Some(block)) = (
+            scratch.sigma_j.take(),
+            rates.j_dissipation.as_mut(),
+            sweep.whole(),
+        ) else {
             return 0.0;
         };
         let sigma = sigma_j.components()[0];
@@ -612,7 +497,7 @@ impl Url {
                 }));
             });
         }
-        let input = ForceInput::new(state, reference, scratch);
+        let input = ForceInput::new(state, reference, block, 0);
         if options.linear
             && let Pairs::Closed(pairs) = reference.pair_vectors()
         {
@@ -639,7 +524,8 @@ impl Url {
     }
 
     /// One stage of the integrator: y = keep y0 + take (y + dt dy/dt) for all fields, from the
-    /// rates with loads in place.
+    /// rates with loads in place. A stage that keeps nothing is the first, whose y is y0: there
+    /// `state` is only written.
     pub fn advance_stage(
         &self,
         state: &mut State,
@@ -673,22 +559,31 @@ impl Url {
                 eta: eta.as_mut().and_then(Iterator::next).map(|[e]| e),
             })
             .collect();
-        parallel::map_slabs(slabs, |slab, out| {
-            vectorised(Advance {
-                reference,
-                start,
-                force,
-                grad_v,
-                j_rate,
-                heating,
-                density,
-                keep,
-                take,
-                dt,
-                slab,
-                out,
-            });
-        });
+        macro_rules! advance {
+            ($first:literal) => {
+                parallel::map_slabs(slabs, |slab, out| {
+                    vectorised(Advance::<$first> {
+                        reference,
+                        start,
+                        force,
+                        grad_v,
+                        j_rate,
+                        heating,
+                        density,
+                        keep,
+                        take,
+                        dt,
+                        slab,
+                        out,
+                    });
+                })
+            };
+        }
+        if keep == 0.0 {
+            advance!(true);
+        } else {
+            advance!(false);
+        }
     }
 
     /// Makes the current configuration the reference ([URL22] algorithm 1, steps 5 to 8): F_chi <-
@@ -774,15 +669,17 @@ impl Url {
         let weights = reference.slices.weights();
         let (mut shortest, mut closest) = (f64::INFINITY, None);
         let (mut least, mut thinnest) = (f64::INFINITY, Layout::FIRST);
+        let stretches = parallel::fill(reference.layout.slices * SLICE, |i| {
+            stretch(Layout::slot(i))
+        });
         for a in (0..reference.layout.particles).map(Layout::slot) {
-            let own = stretch(a);
+            let own = stretches[a - Layout::FIRST];
             if own < least {
                 (least, thinnest) = (own, a);
             }
             for (b, pair) in reference.slices.of(a) {
-                let wave = |slot| self.scratch.wave.get(slot)[0];
                 let dx = sub3(state.x.get(b), state.x.get(a));
-                let length = dot(dx, dx).sqrt() * 0.5 * (wave(a) + wave(b));
+                let length = dot(dx, dx).sqrt() * 0.5 * (own + stretches[b - Layout::FIRST]);
                 if weights[pair] > 0.0 && length < shortest {
                     (shortest, closest) = (length, Some((a, b)));
                 }
@@ -814,10 +711,7 @@ impl Url {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let s = &self.scratch;
-        s.q.bytes()
-            + s.s.as_ref().map_or(0, Array::bytes)
-            + s.half_grad.as_ref().map_or(0, Array::bytes)
-            + s.wave.bytes()
+        self.sweep.bytes()
             + s.sigma_j.as_ref().map_or(0, |(a, b)| a.bytes() + b.bytes())
             + self.rates.force.bytes()
             + self.rates.grad_v.bytes()
@@ -826,20 +720,7 @@ impl Url {
             + self.rates.heat.as_ref().map_or(0, Array::bytes)
             + self.conduction.as_ref().map_or(0, Conduction::bytes)
             + self.spacing.as_ref().map_or(0, Array::bytes)
-            + std::mem::size_of_val(&self.across.force[..])
     }
-}
-
-/// Gradient of a vector field with respect to the reference, for one slab.
-fn gradient<'a, R: Runner>(
-    reference: &'a Reference,
-    field: [&'a [f64]; 3],
-    slab: usize,
-    out: &mut [&'a mut [f64]; 9],
-) {
-    with_pairs!(reference, pairs => R::run(Gradient {
-        pairs, reference, field, slab, out,
-    }));
 }
 
 /// How the passes run: on vectors, or in the tests one particle at a time as the readable form.
@@ -862,7 +743,10 @@ pub fn deform(state: &mut State, reference: &Reference) {
     let x = state.x.components();
     let mut f = Array::new(layout, flat(&IDENTITY));
     parallel::map_slabs(f.slabs_mut(), |slab, mut out| {
-        gradient::<Vectors>(reference, x, slab, &mut out);
+        let run = layout.slab_range(slab);
+        with_pairs!(reference, pairs => vectorised(Gradient {
+            pairs, reference, field: x, run, out: &mut out,
+        }));
     });
     for slot in (0..layout.particles).map(Layout::slot) {
         state.deform(slot, matrix(&f.get(slot)));
@@ -1024,8 +908,19 @@ mod tests {
             let (reference, state, mut url) = body(overrides);
             url.evaluate(&state, &reference, None)
                 .expect("a good state");
-            let pieces = reference.layout.slices.div_ceil(url.across.each);
-            let input = ForceInput::new(&state, &reference, &url.scratch);
+            let chunks = url.sweep.chunks();
+            url.sweep = Sweep::new(
+                &reference,
+                Needs {
+                    areas: true,
+                    gradients: true,
+                    whole: true,
+                },
+            );
+            url.evaluate(&state, &reference, None)
+                .expect("a good state");
+            let block = url.sweep.whole().expect("asked for");
+            let input = ForceInput::new(&state, &reference, block, 0);
             let speeds = url.wave_speeds();
             let (mut error, mut largest) = (0.0_f64, 0.0_f64);
             for a in (0..reference.layout.particles).map(Layout::slot) {
@@ -1035,10 +930,10 @@ mod tests {
                 largest = largest.max(dot(force, force).sqrt());
             }
             println!(
-                "{overrides:?}: {:.1e} (1e-13), {pieces} pieces",
+                "{overrides:?}: {:.1e} (1e-13), {chunks} chunks",
                 error / largest
             );
-            assert!(error < 1e-13 * largest && pieces > 1);
+            assert!(error < 1e-13 * largest && chunks > 1);
         }
     }
 

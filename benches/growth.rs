@@ -1,0 +1,112 @@
+//! What a step costs from a thousand to a million particles: `cargo bench --bench growth [-- FILTER]`.
+//!
+//! The twisting column at its start, CPU time of one thread; the least of several runs counts. The table goes
+//! to the standard output, and `target/growth.csv` has the same for `benches/growth.py`.
+
+use std::fmt::Write as _;
+
+use rustix::time::{ClockId, clock_gettime};
+use urlsph::{Scene, Simulation};
+
+const SCENE: &str = include_str!("../examples/column_twisting/scene.json");
+
+const JITTER: &str = "geometry.box.jitter={\"fraction\": 0.2}";
+
+/// Cells across the column.
+const SIZES: [u32; 7] = [5, 8, 11, 16, 25, 36, 55];
+
+/// Name, overrides.
+const BODIES: [(&str, &[&str]); 4] = [
+    ("lattice", &[]),
+    (
+        "stored",
+        &[
+            "numerics.kernel_option=4",
+            "numerics.reference_update={\"every\": 2}",
+        ],
+    ),
+    ("jittered, kernel", &[JITTER, "numerics.operators=kernel"]),
+    (
+        "jittered, repaired",
+        &[JITTER, "numerics.operators=repaired"],
+    ),
+];
+
+/// Pairs that a measurement computes at least, and how often it is repeated.
+const PAIRS: usize = 20_000_000;
+const REPEATS: usize = 5;
+
+fn cpu_seconds() -> f64 {
+    let now = clock_gettime(ClockId::ProcessCPUTime);
+    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
+}
+
+/// Least seconds of a piece of work.
+fn least(mut work: impl FnMut()) -> f64 {
+    let mut least = f64::INFINITY;
+    for _ in 0..REPEATS {
+        let start = cpu_seconds();
+        work();
+        least = least.min(cpu_seconds() - start);
+    }
+    least
+}
+
+fn main() {
+    let filter = std::env::args().skip(1).find(|a| !a.starts_with('-'));
+    let mut csv = String::from(
+        "body,particles,pairs,setup_s,bytes,rhs_ns_per_pair,step_ns_per_pair,step_us_per_particle\n",
+    );
+    println!(
+        "| body | particles | set-up [s] | bytes/particle | right-hand side [ns/pair] | step [ns/pair/rhs] | step [us/particle] |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for (body, overrides) in BODIES {
+        for cells in SIZES {
+            let name = format!("{body}/{cells}");
+            if filter.as_ref().is_some_and(|f| !name.contains(f.as_str())) {
+                continue;
+            }
+            let mut all = vec![format!("geometry.box.spacing={}", 1.0 / f64::from(cells))];
+            all.extend(overrides.iter().map(|o| (*o).to_string()));
+            let scene = Scene::from_json(SCENE, &all).expect("the example is a scene");
+            let start = cpu_seconds();
+            let mut simulation = Simulation::with_threads(scene, 1).expect("it can be set up");
+            let setup = cpu_seconds() - start;
+            let few = 2.0 * simulation.stable_step();
+            simulation.advance(few).expect("it runs");
+            let (particles, pairs) = (simulation.particle_count(), simulation.pair_count());
+            let bytes = simulation.memory() / particles;
+            let times = PAIRS.div_ceil(3 * pairs).max(2);
+            let rhs = least(|| {
+                for _ in 0..times {
+                    simulation.evaluate().expect("a good state");
+                }
+            }) / (times * pairs) as f64;
+            let mut steps = 0;
+            let step = least(|| {
+                let before = simulation.steps();
+                // A hair less than full steps.
+                let end = simulation.time() + 0.999 * times as f64 * simulation.stable_step();
+                simulation.advance(end).expect("it runs");
+                steps = simulation.steps() - before;
+            }) / (steps as usize * 3 * pairs) as f64;
+            let particle = step * (3 * pairs) as f64 / particles as f64;
+            println!(
+                "| {body} | {particles} | {setup:.2} | {bytes} | {:.2} | {:.2} | {:.3} |",
+                1e9 * rhs,
+                1e9 * step,
+                1e6 * particle
+            );
+            let _ = writeln!(
+                csv,
+                "{body},{particles},{pairs},{setup},{bytes},{},{},{}",
+                1e9 * rhs,
+                1e9 * step,
+                1e6 * particle
+            );
+        }
+    }
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/target/growth.csv");
+    std::fs::write(file, csv).expect("target/ can be written");
+}

@@ -1,0 +1,510 @@
+//! The order in which an evaluation goes through the body.
+//!
+//! The force on a particle needs what the point pass finds of all its neighbours: stress, area,
+//! gradient, wave, 29 numbers. Where nothing else reads them they are found just ahead of the
+//! forces and kept, while they are needed, in a window of each thread, which stays in the cache; that is a
+//! fifth of a step with 28,000 particles, a third with a million, and a quarter of the memory.
+//!
+//! The body is cut into chunks no shorter than the reach, the distance in slices to the farthest neighbour.
+//! The pairs of a chunk reach the head of the next one, as many slices as the reach; so the heads come first,
+//! and then all chunks, in any order and on any number of threads. What the pairs of a chunk do behind
+//! its end is added afterwards. Chunks depend on the body alone, and so do all sums.
+
+use std::ops::Range;
+
+use super::laws::{LawInputs, stresses};
+use super::passes::{
+    Bound, ForceInput, Forces, Gradient, Kept, Limit, Motion, PointOutput, Points,
+};
+use super::riemann::{self, WaveSpeeds};
+use super::url::{Breakdown, Evaluation, Runner, State};
+use crate::lane::{SLICE, Slots};
+use crate::layout::{Array, Layout};
+use crate::material::{Law, with_law};
+use crate::parallel::{self, PerThread};
+use crate::reference::{Pairs, Reference, with_pairs};
+
+/// Slices that a pass does at a time: few enough that what the next pass reads is still in a near cache, enough to
+/// make the bookkeeping negligible.
+const TILE: usize = 32;
+
+/// Chunks that a body should have, for many threads, if they can be some times as long as the reach: copying heads takes a
+/// fifth of an evaluation where they are just as long, and nothing to speak of where they are eight times.
+const CHUNKS: usize = 24;
+const REACHES: std::ops::RangeInclusive<usize> = 2..=16;
+
+/// What the pairs of the force pass read of the particles of some slices.
+#[derive(Debug)]
+pub(super) struct Block {
+    /// Q_a.
+    pub q: Array<9>,
+    /// S_a; only where a dissipation is on.
+    pub s: Option<Array<9>>,
+    /// Half the spatial velocity gradient, 1/2 grad_chi v f^-1, limited if a limiter is on [1/s].
+    pub half_grad: Option<Array<9>>,
+    /// (smallest stretch, spatial density).
+    pub wave: Array<2>,
+}
+
+/// A part of a block, to be written.
+pub(super) struct BlockPart<'a> {
+    pub q: [&'a mut [f64]; 9],
+    pub s: Option<[&'a mut [f64]; 9]>,
+    pub half_grad: Option<[&'a mut [f64]; 9]>,
+    pub wave: [&'a mut [f64]; 2],
+}
+
+impl Block {
+    fn new(layout: Layout, areas: bool, gradients: bool) -> Self {
+        Self {
+            q: Array::new(layout, [0.0; 9]),
+            s: areas.then(|| Array::new(layout, [0.0; 9])),
+            half_grad: gradients.then(|| Array::new(layout, [0.0; 9])),
+            wave: Array::new(layout, [1.0; 2]),
+        }
+    }
+
+    fn part_mut(&mut self, slices: Range<usize>) -> BlockPart<'_> {
+        BlockPart {
+            q: self.q.part_mut(slices.clone()),
+            s: self.s.as_mut().map(|a| a.part_mut(slices.clone())),
+            half_grad: self.half_grad.as_mut().map(|a| a.part_mut(slices.clone())),
+            wave: self.wave.part_mut(slices.clone()),
+        }
+    }
+
+    /// All of it in slabs.
+    fn slabs_mut(&mut self) -> Vec<BlockPart<'_>> {
+        let mut s = self.s.as_mut().map(|s| s.slabs_mut().into_iter());
+        let mut half_grad = self.half_grad.as_mut().map(|h| h.slabs_mut().into_iter());
+        std::iter::zip(self.q.slabs_mut(), self.wave.slabs_mut())
+            .map(|(q, wave)| BlockPart {
+                q,
+                s: s.as_mut().and_then(Iterator::next),
+                half_grad: half_grad.as_mut().and_then(Iterator::next),
+                wave,
+            })
+            .collect()
+    }
+
+    /// Takes over the first slices of another block, to stand from `at` on.
+    fn copy_from(&mut self, other: &Self, at: usize, slices: usize) {
+        fn copy<const N: usize>(to: &mut Array<N>, from: &Array<N>, at: usize, slices: usize) {
+            for (to, from) in std::iter::zip(to.part_mut(at..at + slices), from.part(0..slices)) {
+                to.copy_from_slice(from);
+            }
+        }
+        copy(&mut self.q, &other.q, at, slices);
+        copy(&mut self.wave, &other.wave, at, slices);
+        for (to, from) in [
+            (&mut self.s, &other.s),
+            (&mut self.half_grad, &other.half_grad),
+        ] {
+            if let (Some(to), Some(from)) = (to, from) {
+                copy(to, from, at, slices);
+            }
+        }
+    }
+
+    /// Makes a slice what lies behind the body: numbers that a weight of 0 makes harmless.
+    fn clear(&mut self, slice: usize) {
+        let part = self.part_mut(slice..slice + 1);
+        let tensors = [Some(part.q), part.s, part.half_grad];
+        tensors
+            .into_iter()
+            .flatten()
+            .flatten()
+            .for_each(|c| c.fill(0.0));
+        part.wave.into_iter().for_each(|c| c.fill(1.0));
+    }
+
+    fn bytes(&self) -> usize {
+        let tensors = [Some(&self.q), self.s.as_ref(), self.half_grad.as_ref()];
+        self.wave.bytes()
+            + tensors
+                .into_iter()
+                .flatten()
+                .map(Array::bytes)
+                .sum::<usize>()
+    }
+}
+
+/// Where blocks are kept.
+#[derive(Debug)]
+enum Store {
+    /// Of the whole body at once, for passes over all neighbours that need them.
+    Whole(Block),
+    /// Of the head of each chunk; and of a chunk and the next one's head, for each thread.
+    Chunks {
+        heads: Vec<Block>,
+        windows: PerThread<Block>,
+    },
+}
+
+/// What a body needs of its blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Needs {
+    pub areas: bool,
+    pub gradients: bool,
+    /// Passes over all neighbours read them, too.
+    pub whole: bool,
+}
+
+/// See the module's text.
+#[derive(Debug)]
+pub(super) struct Sweep {
+    layout: Layout,
+    /// Slices of a chunk.
+    each: usize,
+    /// Slices behind a chunk that its pairs reach, at most.
+    reach: usize,
+    store: Store,
+    /// Force [N] on the particles behind each chunk: components, one after the other. Kept apart, no pair is
+    /// computed twice.
+    behind: Vec<Slots>,
+}
+
+/// The three components that follow each other.
+fn split3(all: &mut [Slots]) -> [&mut [f64]; 3] {
+    let (x, rest) = all.split_at_mut(all.len() / 3);
+    let (y, z) = rest.split_at_mut(x.len());
+    [x, y, z].map(bytemuck::must_cast_slice_mut)
+}
+
+/// What the point pass fills, by particle.
+pub(super) struct Outputs<'a> {
+    pub grad_v: &'a mut Array<9>,
+    pub sigma_j: Option<&'a mut Array<1>>,
+    pub theta: Option<&'a mut Array<2>>,
+}
+
+impl Outputs<'_> {
+    /// In pieces of so many slices.
+    fn pieces(&mut self, each: usize) -> Vec<Kept<'_>> {
+        let mut sigma_j = self
+            .sigma_j
+            .as_mut()
+            .map(|s| s.pieces_mut(each).into_iter());
+        let mut theta = self.theta.as_mut().map(|t| t.pieces_mut(each).into_iter());
+        let grad_v = self.grad_v.pieces_mut(each).into_iter();
+        grad_v
+            .map(|grad_v| Kept {
+                grad_v,
+                sigma_j: sigma_j.as_mut().and_then(Iterator::next).map(|[s]| s),
+                theta: theta.as_mut().and_then(Iterator::next),
+            })
+            .collect()
+    }
+}
+
+/// The passes, with all that they have in common.
+#[derive(Clone, Copy)]
+pub(super) struct Passes<'a> {
+    pub law: Law,
+    pub inputs: LawInputs<'a>,
+    /// Whether the law maps its history.
+    pub flow: bool,
+    pub state: &'a State,
+    pub reference: &'a Reference,
+    pub spacing: Option<[&'a [f64]; 6]>,
+    /// Whether Venkatakrishnan's limiter is on.
+    pub limited: bool,
+    pub mode: u8,
+    pub speeds: WaveSpeeds<f64>,
+    pub coefficient: f64,
+    pub shock: f64,
+}
+
+impl Passes<'_> {
+    /// Gradient, law and point passes of a run of slices.
+    fn points<R: Runner>(
+        &self,
+        run: (usize, usize),
+        mut out: PointOutput,
+    ) -> Result<Evaluation, Breakdown> {
+        let Self { reference, .. } = *self;
+        let v = self.state.v.components();
+        with_pairs!(reference, pairs => R::run(Gradient {
+            pairs, reference, field: v, run, out: &mut out.kept.grad_v,
+        }));
+        let stored = with_law!(self.law, law => {
+            stresses::<R, _>(law, self.inputs, self.flow, run, &mut out)
+        })?;
+        let Motion { kinetic, length2 } = R::run(Points {
+            density: self.law.density(),
+            kinematics: self.inputs.kinematics,
+            reference,
+            v,
+            spacing: self.spacing,
+            run,
+            out: &mut out,
+        })?;
+        if let (true, Some(half_grad)) = (self.limited, &mut out.block.half_grad) {
+            let x = self.state.x.components();
+            R::run(Limit {
+                reference,
+                x,
+                v,
+                run,
+                half_grad,
+            });
+        }
+        Ok(Evaluation {
+            strain: stored.strain,
+            thermal: stored.thermal,
+            entropy: stored.entropy,
+            kinetic,
+            length: length2,
+            ..Evaluation::NONE
+        })
+    }
+
+    /// The same of some slices of a chunk that begins in the slot `first`, tile by tile.
+    fn points_of_chunk<R: Runner>(
+        &self,
+        first: usize,
+        slices: Range<usize>,
+        kept: &mut Kept,
+        block: &mut Block,
+    ) -> Result<Evaluation, Breakdown> {
+        let mut total = Evaluation::NONE;
+        for start in slices.clone().step_by(TILE) {
+            let tile = start..slices.end.min(start + TILE);
+            let run = (first + start * SLICE, tile.len());
+            let out = PointOutput {
+                kept: kept.part(tile.clone()),
+                block: block.part_mut(tile),
+            };
+            total.add(&self.points::<R>(run, out)?);
+        }
+        Ok(total)
+    }
+
+    /// Force pass of a run of slices that begins in a chunk at the place `from`.
+    fn forces<'a, R: Runner>(
+        &self,
+        input: ForceInput,
+        run: (usize, usize),
+        out: &mut [&'a mut [f64]; 3],
+        from: usize,
+        behind: &mut [&'a mut [f64]; 3],
+    ) -> Evaluation {
+        let Self {
+            speeds,
+            coefficient,
+            shock,
+            mode,
+            ..
+        } = *self;
+        macro_rules! forces {
+            ($pairs:expr, $($mode:ident),*) => {
+                match mode {
+                    $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
+                        pairs: $pairs, input, speeds, coefficient, shock, run, out, from, behind,
+                    }),)*
+                    _ => unreachable!("six modes"),
+                }
+            };
+        }
+        let (dissipation, length) = with_pairs!(self.reference, pairs => forces!(
+            pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF, GUARDED
+        ));
+        Evaluation {
+            dissipation,
+            length,
+            ..Evaluation::NONE
+        }
+    }
+
+    /// All passes of a chunk whose head, and whatever its pairs reach behind it, stand in the window.
+    fn chunk<R: Runner>(
+        &self,
+        (first, slices): (usize, usize),
+        (head, reach): (usize, usize),
+        window: &mut Block,
+        (mut kept, mut force, mut behind): (Kept, [&mut [f64]; 3], [&mut [f64]; 3]),
+    ) -> Result<Evaluation, Breakdown> {
+        force
+            .iter_mut()
+            .chain(&mut behind)
+            .for_each(|c| c.fill(0.0));
+        let before = first / SLICE - Layout::FIRST / SLICE;
+        let mut total = Evaluation::NONE;
+        let mut ready = head;
+        for start in (0..slices).step_by(TILE) {
+            let end = slices.min(start + TILE);
+            let needed = slices.min(end + reach);
+            if needed > ready {
+                let points = self.points_of_chunk::<R>(first, ready..needed, &mut kept, window)?;
+                total.add(&points);
+                ready = needed;
+            }
+            let input = ForceInput::new(self.state, self.reference, window, before);
+            let (from, run) = (start * SLICE, (first + start * SLICE, end - start));
+            total.add(&self.forces::<R>(input, run, &mut force, from, &mut behind));
+        }
+        Ok(total)
+    }
+
+    /// Scales the gradients of a whole body where operators are no least-squares fit, so that they dissipate.
+    fn bound<R: Runner>(&self, block: &mut Block) {
+        let Pairs::Closed(pairs) = self.reference.pair_vectors() else {
+            return;
+        };
+        let Some(mut half_grad) = block.half_grad.take() else {
+            return;
+        };
+        let speeds = self.speeds;
+        let input = ForceInput::new(self.state, self.reference, block, 0);
+        parallel::map_slabs(half_grad.slabs_mut(), |slab, half_grad| {
+            R::run(Bound {
+                pairs,
+                input,
+                speeds,
+                slab,
+                half_grad,
+            });
+        });
+        block.half_grad = Some(half_grad);
+    }
+}
+
+impl Sweep {
+    /// Of a body.
+    pub fn new(reference: &Reference, needs: Needs) -> Self {
+        let layout = reference.layout;
+        let reach = reference.slices.reach();
+        let reaches =
+            (layout.slices / (CHUNKS * reach.max(1))).clamp(*REACHES.start(), *REACHES.end());
+        let each = (reaches * reach).max(layout.slab);
+        let block = |slices: usize| {
+            let layout = Layout {
+                particles: slices * SLICE,
+                slices,
+                slab: layout.slab,
+            };
+            Block::new(layout, needs.areas, needs.gradients)
+        };
+        let chunks = layout.slices.div_ceil(each);
+        let store = if needs.whole {
+            Store::Whole(Block::new(layout, needs.areas, needs.gradients))
+        } else {
+            Store::Chunks {
+                heads: (0..chunks).map(|_| block(reach)).collect(),
+                // One more for what lies behind the body.
+                windows: PerThread::new(|| block(each.min(layout.slices) + reach + 1)),
+            }
+        };
+        Self {
+            layout,
+            each,
+            reach,
+            store,
+            behind: vec![Slots([0.0; SLICE]); chunks * 3 * reach],
+        }
+    }
+
+    /// The block of the whole body, where it is kept.
+    pub fn whole(&self) -> Option<&Block> {
+        match &self.store {
+            Store::Whole(block) => Some(block),
+            Store::Chunks { .. } => None,
+        }
+    }
+
+    /// Number of chunks.
+    #[cfg(test)]
+    pub fn chunks(&self) -> usize {
+        self.layout.slices.div_ceil(self.each)
+    }
+
+    /// All passes over the body; the length is still squared.
+    pub fn run<R: Runner>(
+        &mut self,
+        passes: Passes,
+        mut out: Outputs,
+        force: &mut Array<3>,
+    ) -> Result<Evaluation, Breakdown> {
+        let Self { each, reach, .. } = *self;
+        let total = match &mut self.store {
+            Store::Whole(block) => {
+                let slabs = std::iter::zip(out.pieces(self.layout.slab), block.slabs_mut());
+                let points = parallel::map_slabs(slabs.collect(), |slab, (kept, block)| {
+                    let run = self.layout.slab_range(slab);
+                    passes.points::<R>(run, PointOutput { kept, block })
+                });
+                let points = Evaluation::sum(points)?;
+                passes.bound::<R>(block);
+                let input = ForceInput::new(passes.state, passes.reference, block, 0);
+                let forces = force.pieces_mut(each).into_iter();
+                let chunks = forces.zip(self.behind.chunks_mut(3 * reach)).collect();
+                let forces = parallel::map_slabs(chunks, |chunk, (mut force, behind)| {
+                    let mut behind = split3(behind);
+                    force
+                        .iter_mut()
+                        .chain(&mut behind)
+                        .for_each(|c| c.fill(0.0));
+                    let run = self.layout.piece_range(chunk, each);
+                    passes.forces::<R>(input, run, &mut force, 0, &mut behind)
+                });
+                Evaluation::sum([points].into_iter().chain(forces).map(Ok))?
+            }
+            Store::Chunks { heads, windows } => {
+                let chunks = std::iter::zip(out.pieces(each), &mut *heads).collect();
+                let points = parallel::map_slabs(chunks, |chunk, (mut kept, head)| {
+                    let (first, slices) = self.layout.piece_range(chunk, each);
+                    passes.points_of_chunk::<R>(first, 0..slices.min(reach), &mut kept, head)
+                });
+                let points = Evaluation::sum(points)?;
+                let forces = force.pieces_mut(each);
+                let kept = out.pieces(each).into_iter();
+                let chunks = kept.zip(forces).zip(self.behind.chunks_mut(3 * reach));
+                let heads = &*heads;
+                let reach_of = |chunk| self.layout.piece_range(chunk, each).1.min(reach);
+                let chunks = windows.map(
+                    chunks.collect(),
+                    |window, chunk, ((kept, force), behind)| {
+                        let (first, slices) = self.layout.piece_range(chunk, each);
+                        let head = reach_of(chunk);
+                        window.copy_from(&heads[chunk], 0, head);
+                        let mut end = slices;
+                        if let Some(next) = heads.get(chunk + 1) {
+                            let head = reach_of(chunk + 1);
+                            window.copy_from(next, slices, head);
+                            end += head;
+                        }
+                        window.clear(end);
+                        let behind = split3(behind);
+                        passes.chunk::<R>(
+                            (first, slices),
+                            (head, reach),
+                            window,
+                            (kept, force, behind),
+                        )
+                    },
+                );
+                Evaluation::sum([Ok(points)].into_iter().chain(chunks))?
+            }
+        };
+        // What lies behind a chunk is in the next one.
+        let chunks = force.pieces_mut(each).into_iter().skip(1);
+        let chunks = chunks.zip(self.behind.chunks_mut(3 * reach)).collect();
+        parallel::map_slabs(chunks, |_, (force, before)| {
+            for (force, before) in force.into_iter().zip(split3(before)) {
+                force.iter_mut().zip(before).for_each(|(f, b)| *f += *b);
+            }
+        });
+        Ok(total)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let blocks = match &self.store {
+            Store::Whole(block) => block.bytes(),
+            Store::Chunks { heads, windows } => {
+                heads.iter().map(Block::bytes).sum::<usize>() + windows.sum(Block::bytes)
+            }
+        };
+        blocks + std::mem::size_of_val(&self.behind[..])
+    }
+}
