@@ -2,6 +2,8 @@
 //!
 //! Imports nothing of ours but the lane. Set-up code that needs decompositions uses nalgebra.
 
+use std::ops::Deref;
+
 use crate::lane::{INVERSE_FACTORIALS, Lane};
 
 /// A vector.
@@ -99,6 +101,37 @@ pub fn add9<T: Lane>(a: &Mat3<T>, b: &Mat3<T>) -> Mat3<T> {
 #[inline(always)]
 pub fn scale9<T: Lane>(s: T, a: &Mat3<T>) -> Mat3<T> {
     [scale3(s, a[0]), scale3(s, a[1]), scale3(s, a[2])]
+}
+
+/// s a, of any number of components.
+///
+/// A loop, as in [`load_all`]: closures given to the arrays' own functions are compiled without the vector
+/// instructions of the caller, and each of their operations is then a call.
+#[inline(always)]
+pub fn scale_all<T: Lane, const N: usize>(s: T, a: &[T; N]) -> [T; N] {
+    let mut scaled = *a;
+    let mut c = 0;
+    while c < N {
+        scaled[c] = s * a[c];
+        c += 1;
+    }
+    scaled
+}
+
+/// All components of the particles in the slots from `at`.
+#[inline(always)]
+pub fn load_all<T: Lane, const N: usize>(
+    token: T::Token,
+    from: &[impl Deref<Target = [f64]>; N],
+    at: usize,
+) -> [T; N] {
+    let mut all = [T::splat(token, 0.0); N];
+    let mut c = 0;
+    while c < N {
+        all[c] = T::load(token, &from[c], at);
+        c += 1;
+    }
+    all
 }
 
 /// A + s B.
@@ -304,8 +337,8 @@ pub fn ln_symmetric<T: Lane>(b: &Sym3<T>) -> Sym3<T> {
         adjugate[0][2],
         adjugate[1][2],
     ];
-    let z2 = commuting_product(&difference, &inverse).map(|z| z * factor); // 2 Z
-    let y = commuting_product(&z2, &z2).map(|y| y * one.of(0.25)); // Z^2
+    let z2 = scale_all(factor, &commuting_product(&difference, &inverse)); // 2 Z
+    let y = scale_all(one.of(0.25), &commuting_product(&z2, &z2)); // Z^2
     let series = polynomial(
         &y,
         &commuting_product(&y, &y),
@@ -316,7 +349,7 @@ pub fn ln_symmetric<T: Lane>(b: &Sym3<T>) -> Sym3<T> {
         return near;
     }
     let (values, vectors) = eigen(b);
-    let far = spectral(values.map(T::ln), &vectors);
+    let far = spectral([values[0].ln(), values[1].ln(), values[2].ln()], &vectors);
     select(outside, &far, &near)
 }
 
@@ -334,14 +367,23 @@ pub fn exp_symmetric<T: Lane>(a: &Sym3<T>) -> Sym3<T> {
         return near;
     }
     let (values, vectors) = eigen(a);
-    let far = spectral(values.map(T::exp), &vectors);
+    let far = spectral(
+        [values[0].exp(), values[1].exp(), values[2].exp()],
+        &vectors,
+    );
     select(outside, &far, &near)
 }
 
 /// `yes` where `choice > 0`, else `no`.
 #[inline(always)]
 pub fn select<T: Lane, const N: usize>(choice: T, yes: &[T; N], no: &[T; N]) -> [T; N] {
-    std::array::from_fn(|k| choice.if_positive(yes[k], no[k]))
+    let mut chosen = *no;
+    let mut c = 0;
+    while c < N {
+        chosen[c] = choice.if_positive(yes[c], no[c]);
+        c += 1;
+    }
+    chosen
 }
 
 /// Sum of values[k] v_k (x) v_k over the rows v_k.

@@ -62,7 +62,7 @@ impl<M: Material, const FLOW: bool> Work for Laws<'_, '_, '_, M, FLOW> {
             let total = kinematics.total::<T>(token, a);
             let v_r = T::load(token, volume, a);
             let mut history = match &self.inputs.history {
-                Some(history) if M::HISTORY => load7(token, history, a),
+                Some(history) if M::HISTORY => load_all(token, history, a),
                 _ => [zero; 7],
             };
             let mut theta = zero;
@@ -137,7 +137,7 @@ impl<M: Material> Work for Flow<'_, M> {
         for (at, a) in lanes_of::<T>(self.reference, self.slab) {
             let total = self.kinematics.total::<T>(token, a);
             let v_r = T::load(token, volume, a);
-            let mut history: [T; 7] = std::array::from_fn(|c| T::load(token, self.history[c], at));
+            let mut history: [T; 7] = load_all(token, &self.history, at);
             let mut theta = T::splat(token, 0.0);
             if let Some((eta, thermal)) = &self.heat {
                 let now = T::load(token, eta, at);
@@ -229,9 +229,4 @@ pub(super) fn stresses<R: Runner, M: Material>(
             out,
         })
     }
-}
-
-#[inline(always)]
-fn load7<T: Lane>(token: T::Token, from: &[&[f64]; 7], at: usize) -> [T; 7] {
-    std::array::from_fn(|c| T::load(token, from[c], at))
 }

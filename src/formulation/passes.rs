@@ -234,7 +234,7 @@ impl Work for Points<'_, '_, '_> {
             admissible.min(at, (infinity - motion).if_positive(one, zero));
 
             if let Some(spacing) = &spacing {
-                let n = std::array::from_fn(|c| T::load(token, spacing[c], a));
+                let n = load_all(token, spacing, a);
                 let stretch = T::load(token, block.wave[0], at);
                 let length2 = bounded_length2(&kinematics.total(token, a).f, &n, stretch);
                 shortest.min(at, v_r.if_positive(length2, infinity));
@@ -556,8 +556,8 @@ impl<T: Lane> Areas<T> {
     fn length(&self, volume: T) -> T {
         let [xx, yy, zz, yz, zx, xy] = self.second;
         let s = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
-        let [x, y, z] = mat_mul(&s, &s).map(|row| dot(row, row));
-        let eigenvalue = (x + y + z).sqrt().sqrt();
+        let squared = mat_mul(&s, &s);
+        let eigenvalue = double_dot(&squared, &squared).sqrt().sqrt();
         let trace = xx + yy + zz;
         let factor = xx.of(2.3);
         factor * volume / self.total * (trace / eigenvalue).sqrt()
@@ -835,7 +835,7 @@ impl<P: PairVectors> Work for BoundSlope<'_, P> {
             let centre = pairs.centre::<T>(token, a);
             let sa = input.area::<T>(token, a);
             let sigma_a = T::load(token, self.sigma, a);
-            let half: Vec3<T> = std::array::from_fn(|c| T::load(token, self.half_slope[c], at));
+            let half: Vec3<T> = load_all(token, &self.half_slope, at);
             let (mut jumps, mut half_steps) = (zero, zero);
             for (b, pair) in input.reference.slices.of(a) {
                 let vectors = pairs.pair(token, &centre, b, pair);

@@ -93,7 +93,7 @@ pub fn dissipation<T: Lane>(pair: &Pair<T>, jump: Vec3<T>, speeds: WaveSpeeds<T>
 #[inline(always)]
 pub fn guarded<T: Lane>(d: Vec3<T>, dv: Vec3<T>) -> Vec3<T> {
     let (work, none) = (dot(d, dv), d[0].of(0.0));
-    d.map(|d| work.if_positive(d, none))
+    select(work, &d, &[none; 3])
 }
 
 /// D^j_ab with a coefficient, for the rate of the volume V_chi dj/dt ([URL22] 59, 60): spatial like

@@ -28,10 +28,11 @@ use crate::reference::{Pairs, Reference, with_pairs};
 /// make the bookkeeping negligible.
 const TILE: usize = 32;
 
-/// Chunks that a body should have, for many threads, if they can be some times as long as the reach: copying heads takes a
-/// fifth of an evaluation where they are just as long, and nothing to speak of where they are eight times.
+/// Chunks that a body has, to feed many threads, where they can be several times as long as the reach then. Copying heads takes
+/// a quarter of an evaluation where chunks are just as long, a tenth where they are twice as long, and nothing
+/// that could be measured from eight times on.
 const CHUNKS: usize = 24;
-const REACHES: std::ops::RangeInclusive<usize> = 2..=16;
+const REACHES: (usize, usize) = (3, 16);
 
 /// What the pairs of the force pass read of the particles of some slices.
 #[derive(Debug)]
@@ -374,8 +375,7 @@ impl Sweep {
     pub fn new(reference: &Reference, needs: Needs) -> Self {
         let layout = reference.layout;
         let reach = reference.slices.reach();
-        let reaches =
-            (layout.slices / (CHUNKS * reach.max(1))).clamp(*REACHES.start(), *REACHES.end());
+        let reaches = (layout.slices / (CHUNKS * reach.max(1))).clamp(REACHES.0, REACHES.1);
         let each = (reaches * reach).max(layout.slab);
         let block = |slices: usize| {
             let layout = Layout {

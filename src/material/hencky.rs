@@ -96,8 +96,8 @@ impl<Y: Yield> Material for Hencky<Y> {
         // Elastic trial. The logarithm gets an isochoric b_e, next to the identity for a metal at any
         // J; its deviator does not depend on that.
         let [xx, yy, zz, xy, xz, yz, strain] = *history;
-        let b = congruence(f, &[xx, yy, zz, xy, xz, yz]).map(|b| scale2 * b);
-        let mut e = deviator(&ln_symmetric(&b)).map(|l| j.of(0.5) * l);
+        let b = scale_all(scale2, &congruence(f, &[xx, yy, zz, xy, xz, yz]));
+        let mut e = scale_all(j.of(0.5), &deviator(&ln_symmetric(&b)));
         let mut von_mises = (j.of(6.0) * square(&e)).sqrt() * j.of(mu);
 
         let mut dissipation = j.of(0.0);
@@ -112,10 +112,10 @@ impl<Y: Yield> Material for Hencky<Y> {
             });
             if increment.any_positive() {
                 let s = increment.if_positive(one - three_mu * increment / von_mises, one);
-                e = e.map(|e| s * e);
+                e = scale_all(s, &e);
                 von_mises = s * von_mises;
-                let b = exp_symmetric(&e.map(|e| e + e));
-                let inverse = congruence(&transpose(&cof), &b).map(|c| scale2 * scale2 * c);
+                let b = exp_symmetric(&scale_all(j.of(2.0), &e));
+                let inverse = scale_all(scale2 * scale2, &congruence(&transpose(&cof), &b));
                 let [xx, yy, zz, xy, xz, yz] = inverse;
                 let flown = [xx, yy, zz, xy, xz, yz, strain + increment];
                 *history = select(increment, &flown, history);
@@ -125,7 +125,7 @@ impl<Y: Yield> Material for Hencky<Y> {
 
         let ln_j = j.ln();
         let sigma_j = j.of(kappa) * ln_j / *j;
-        let tau = full(&e.map(|e| j.of(2.0 * mu) * e));
+        let tau = full(&scale_all(j.of(2.0 * mu), &e));
         // A wave along n in a body with stress tau travels at c^2 rho_R = kappa (1 - ln J) + 4/3 mu -
         // dev(tau)_nn where n is a principal direction; the strain's own contribution to the shear
         // terms, and dev(tau)_nn, are below 4/3 q.

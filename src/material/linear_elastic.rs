@@ -41,7 +41,7 @@ impl Material for LinearElastic {
         let pressure = one.of(self.0.kappa) * volume;
         let deviator = deviator(&e);
         let two_mu = one.of(2.0 * self.0.mu);
-        let mut p = full(&deviator.map(|e| two_mu * e));
+        let mut p = full(&scale_all(two_mu, &deviator));
         for k in 0..3 {
             p[k][k] = p[k][k] + pressure;
         }
