@@ -81,7 +81,7 @@ impl Default for Meter {
 
 impl Meter {
     /// Right-hand sides of a step.
-    const STAGES: u64 = 3;
+    pub const STAGES: u64 = 3;
 
     pub fn new(clock: fn() -> f64) -> Self {
         Self {

@@ -1,6 +1,7 @@
 //! The project's tasks: `cargo xtask <task>`.
 
 mod bench;
+mod counts;
 mod demo;
 mod ffi_tests;
 mod fmu_tests;
@@ -25,6 +26,8 @@ Usage: cargo xtask <TASK>
 Tasks:
   bench       Speed against accuracy: cases with reference solutions over resolution and numerics, as
               JSON, CSV and a report under target/bench/; --quick takes a minute (bench --help)
+  counts      Instructions, memory, pair-updates and errors against those expected; --update makes the
+              present ones the expected ones (benches/counts/README.md)
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
@@ -55,6 +58,7 @@ fn run(arguments: &[String]) -> Result<()> {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments.as_slice() {
         ["bench", arguments @ ..] => bench::bench(&sh, arguments),
+        ["counts", arguments @ ..] => counts::counts(&sh, arguments),
         ["demo"] => demo::demo(&sh),
         ["ffi-tests"] => ffi_tests::run(&sh),
         ["fmu-tests"] => fmu_tests::run(&sh),

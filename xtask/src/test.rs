@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
 use crate::bench::bench_tests;
+use crate::counts::counts_tests;
 use crate::ffi_tests::ffi_tests;
 use crate::fmu_tests::fmu_tests;
 use crate::output_tests::output_tests;
@@ -24,6 +25,7 @@ const PARTS: &[Part] = &[
     ("rust", rust),
     ("output files", output_tests),
     ("bench", bench_tests),
+    ("counts", counts_tests),
     ("C, C++, Python", ffi_tests),
     ("fmu", fmu_tests),
     ("peer", peer_tests),

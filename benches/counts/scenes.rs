@@ -1,0 +1,118 @@
+//! What is counted: a column at the start of a twist with one thing after another on top, and small cases.
+
+use urlsph::Scene;
+
+const TWISTING: &str = include_str!("../../examples/column_twisting/scene.json");
+
+/// 7 x 37 x 7 particles: more would take longer under valgrind and count the same.
+const SPACING: &str = "geometry.box.spacing=0.16666666666666666";
+
+/// The column as it is, elastic, and what the others are compared with.
+pub const ELASTIC: &str = "elastic";
+
+/// A scene whose instructions are counted.
+pub struct Counted {
+    pub name: &'static str,
+    /// Whether it stands in the table of the README.
+    pub shown: bool,
+    overrides: &'static [&'static str],
+}
+
+impl Counted {
+    pub fn read(&self) -> urlsph::Result<Scene> {
+        let mut all = vec![SPACING.to_owned()];
+        all.extend(self.overrides.iter().map(|o| (*o).to_owned()));
+        Scene::from_json(TWISTING, &all)
+    }
+}
+
+const fn shown(name: &'static str, overrides: &'static [&'static str]) -> Counted {
+    Counted {
+        name,
+        shown: true,
+        overrides,
+    }
+}
+
+const fn guarded(name: &'static str, overrides: &'static [&'static str]) -> Counted {
+    Counted {
+        name,
+        shown: false,
+        overrides,
+    }
+}
+
+// As soft as the column is: the metals flow from the first steps on.
+const VON_MISES: &str = r#"material={"von_mises": {
+    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
+    "yield_stress": 1e4, "hardening_modulus": 1e5
+}}"#;
+const JOHNSON_COOK: &str = r#"material={"johnson_cook": {
+    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
+    "yield_stress": 1e4, "hardening_modulus": 1e5, "hardening_exponent": 0.31,
+    "rate_coefficient": 0.025, "reference_strain_rate": 1,
+    "softening_exponent": 1.09, "melting_temperature": 1356, "transition_temperature": 290
+}}"#;
+const HEAT: &str = r#"heat={
+    "specific_heat": 383, "reference_temperature": 293, "conductivity": 10, "gruneisen_coefficient": 0.1
+}"#;
+const JITTER: &str = r#"geometry.box.jitter={"fraction": 0.2}"#;
+const EVERY_STEP: &str = "numerics.reference_update=every_step";
+
+pub const SCENES: &[Counted] = &[
+    shown(ELASTIC, &[]),
+    shown("heat with conduction", &[HEAT]),
+    shown("von Mises plasticity", &[VON_MISES]),
+    shown(
+        "Johnson–Cook plasticity, heat with conduction",
+        &[JOHNSON_COOK, HEAT],
+    ),
+    shown(
+        "independent j, volume dissipation D^j",
+        &["numerics.state=fj", "numerics.volume_dissipation=0.05"],
+    ),
+    shown(
+        "angular-momentum projection",
+        &["numerics.angular_momentum_projection=true"],
+    ),
+    shown("update at every step, kernel option 1", &[EVERY_STEP]),
+    shown(
+        "update at every step, kernel option 3",
+        &[EVERY_STEP, "numerics.kernel_option=3"],
+    ),
+    guarded("without dissipation", &["numerics.dissipation=false"]),
+    guarded("first order", &["numerics.reconstruction=none"]),
+    guarded("minmod limiter", &["numerics.limiter=minmod"]),
+    guarded("shock limiter", &["numerics.limiter=shock"]),
+    guarded(
+        "Venkatakrishnan limiter",
+        &["numerics.limiter=venkatakrishnan"],
+    ),
+    guarded("independent h and j", &["numerics.state=fhj"]),
+    guarded(
+        "20 % jitter, operators of the kernel",
+        &[JITTER, "numerics.operators=kernel"],
+    ),
+    guarded("20 % jitter, repaired", &[JITTER]),
+    guarded(
+        "20 % jitter, repaired, update at every step, kernel option 3",
+        &[JITTER, EVERY_STEP, "numerics.kernel_option=3"],
+    ),
+    guarded(
+        "20 % jitter, operators of the mesh",
+        &[JITTER, "numerics.operators=mesh", "numerics.neighbours=26"],
+    ),
+];
+
+/// Cases of `tests/cases` and the sizes of which pair-updates and errors are compared: seconds in all.
+pub const CASE_SIZES: &[(&str, &str)] = &[
+    ("bending", "M1"),
+    ("twisting", "M1"),
+    ("tension", "M2"),
+    ("elastic-cube", "9"),
+    ("slab", "21"),
+    ("thermo-wave", "21"),
+    ("cable", "306"),
+    ("copper-bar", "437"),
+    ("johnson-cook-bar", "437"),
+];
