@@ -135,7 +135,7 @@ impl Simulation {
     pub fn with_threads(scene: Scene, threads: usize) -> Result<Self> {
         scene.validate()?;
         let pool = Pool::new(threads)?;
-        let particles = Particles::new(&scene)?;
+        let particles = pool.install(|| Particles::new(&scene))?;
         let boundary = Boundary::new(&scene, &particles)?;
         let probes = Probes::new(&scene, &particles)?;
         let (law, thermal) = Law::of(&scene);

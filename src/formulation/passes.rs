@@ -577,11 +577,9 @@ pub(super) struct Forces<'a, 'o, 'p, P, const MODE: u8> {
     /// What makes up for that share in a shock, 0 without a limiter of shocks.
     pub shock: f64,
     pub run: (usize, usize),
-    /// Forces on the chunk that the run is part of, and where it begins there.
-    pub out: &'o mut [&'p mut [f64]; 3],
+    /// Where the run begins in its chunk, and the forces there.
     pub from: usize,
-    /// The same for the particles behind the chunk.
-    pub behind: &'o mut [&'p mut [f64]; 3],
+    pub sums: &'o mut Sums<'p>,
 }
 
 impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
@@ -595,9 +593,8 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
             coefficient,
             shock,
             run,
-            out,
             from,
-            behind,
+            sums,
         } = self;
         let (input, pairs) = input.level::<P, MODE>(pairs);
         let slices = &input.reference.slices;
@@ -646,10 +643,10 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
                     f = add3(f, d);
                 }
                 force = add3(force, f);
-                take_off(f, out, behind, at + (b - a));
+                take_off(f, sums, at + (b - a));
             }
             // Only now: a pair within the lanes has changed what stands here.
-            store3(&add3(load_slab3(token, out, at), force), out, at);
+            sums.add(force, at);
             power.add(at, work);
             shortest.min(at, length2);
         }
@@ -657,14 +654,30 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
     }
 }
 
+/// Sums over pairs of a chunk, and of as many slices behind it as its pairs reach.
+pub(super) struct Sums<'a> {
+    pub out: [&'a mut [f64]; 3],
+    pub behind: [&'a mut [f64]; 3],
+}
+
+impl Sums<'_> {
+    /// Begins with nothing.
+    pub fn clear(&mut self) {
+        let all = self.out.iter_mut().chain(&mut self.behind);
+        all.for_each(|c| c.fill(0.0));
+    }
+    /// Adds at a place of the chunk.
+    #[inline(always)]
+    fn add<T: Lane>(&mut self, value: Vec3<T>, at: usize) {
+        let sum = add3(load_slab3(value[0].token(), &self.out, at), value);
+        store3(&sum, &mut self.out, at);
+    }
+}
+
 /// Takes a vector off what stands at a place of a chunk, or behind its end.
 #[inline(always)]
-fn take_off<T: Lane>(
-    value: Vec3<T>,
-    chunk: &mut [&mut [f64]; 3],
-    behind: &mut [&mut [f64]; 3],
-    at: usize,
-) {
+fn take_off<T: Lane>(value: Vec3<T>, sums: &mut Sums, at: usize) {
+    let Sums { out: chunk, behind } = sums;
     let end = chunk[0].len();
     let token = value[0].token();
     let within = |to: &mut [&mut [f64]; 3], at: usize| {
@@ -734,45 +747,71 @@ fn bounded_share<T: Lane>(jumps: T, half_steps: T) -> T {
     (steps - limit).if_positive(limit / steps, jumps.of(1.0))
 }
 
-/// Scales the gradients for the reconstruction so that they do not make energy.
+/// What scales the gradients for the reconstruction so that they do not make energy.
 ///
 /// Half of what a pair dissipates belongs to each of its particles: sum_b dv . K (dv - g_a dx) / 2, K being
 /// D_ab per jump. Were g_a the least-squares fit with the weights K, that would be sum_b |dv - g_a dx|_K^2 / 2.
 /// A repaired gradient, which may owe all of itself to one neighbour, or more, can make it negative, and
 /// modes have grown by it (tetrahedra, nu = 0.495). g_a is scaled where the second term is more than
 /// [`RECONSTRUCTED_SHARE`] times the first.
-pub(super) struct Bound<'a, P> {
+///
+/// This sums what the jumps dissipate (first component) and what half of the reconstructed steps take of it (second)
+/// over the pairs whose first particle lies in a chunk, for both particles as [`Forces`] does.
+pub(super) struct Dissipated<'a, 'o, 'p, P> {
     pub pairs: P,
     pub input: ForceInput<'a>,
     pub speeds: WaveSpeeds<f64>,
-    pub slab: usize,
-    pub half_grad: [&'a mut [f64]; 9],
+    /// All of a chunk.
+    pub run: (usize, usize),
+    pub sums: &'o mut Sums<'p>,
 }
 
-impl<P: PairVectors> Work for Bound<'_, P> {
+impl<P: PairVectors> Work for Dissipated<'_, '_, '_, P> {
     type Output = ();
     #[inline(always)]
-    fn run<T: Lane>(mut self, token: T::Token) {
+    fn run<T: Lane>(self, token: T::Token) {
+        let sums = self.sums;
         let speeds = WaveSpeeds {
             pressure: T::splat(token, self.speeds.pressure),
             shear: T::splat(token, self.speeds.shear),
         };
         let zero = T::splat(token, 0.0);
-        let (input, pairs) = self.input.level::<P, { riemann::CONSTANT }>(self.pairs);
-        for (at, a) in lanes_of::<T>(input.reference, self.slab) {
+        let (input, pairs) = self.input.level::<P, { riemann::LINEAR }>(self.pairs);
+        for (at, a) in lanes_from::<T>(self.run) {
             let here = input.here::<T>(token, a);
             let centre = pairs.centre::<T>(token, a);
-            let sa = input.area::<T>(token, a);
-            let half = load_slab9::<T>(token, &self.half_grad, at);
+            let (sa, half_a) = (input.area::<T>(token, a), input.half_grad::<T>(token, a));
             let (mut jumps, mut half_steps) = (zero, zero);
-            for (b, pair) in input.reference.slices.of(a) {
+            for (b, pair) in input.reference.slices.after(a) {
                 let vectors = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
                 p.area = input.pair_area(&sa, b, vectors);
                 let d = riemann::dissipation(&p, p.dv, speeds);
-                jumps = jumps + dot(d, p.dv);
-                half_steps = half_steps + dot(d, mat_vec(&half, p.dx));
+                let jump = dot(d, p.dv);
+                let step = dot(d, mat_vec(&input.half_grad(token, b), p.dx));
+                take_off([-jump, -step, zero], sums, at + (b - a));
+                jumps = jumps + jump;
+                half_steps = half_steps + dot(d, mat_vec(&half_a, p.dx));
             }
+            sums.add([jumps, half_steps, zero], at);
+        }
+    }
+}
+
+/// Scales the gradients of a slab by what [`Dissipated`] found.
+pub(super) struct Bound<'a> {
+    pub sums: [&'a [f64]; 3],
+    pub run: (usize, usize),
+    pub half_grad: [&'a mut [f64]; 9],
+}
+
+impl Work for Bound<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Lane>(mut self, token: T::Token) {
+        for (at, a) in lanes_from::<T>(self.run) {
+            let [jumps, half_steps, _] = load3::<T>(token, &self.sums, a);
+            let half = load_slab9::<T>(token, &self.half_grad, at);
             let share = bounded_share(jumps, half_steps);
             store9(&scale9(share, &half), &mut self.half_grad, at);
         }

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use super::{Face, MeshFile, NONE, Particles, Shape, Share, patches, surface};
 use crate::error::{Code, Error, Result};
 use crate::math::*;
+use crate::parallel;
 use crate::scene::PatchSelection;
 
 /// Cells between particles.
@@ -226,7 +227,13 @@ impl Cell {
     fn jacobian(&self, at: &ShapeFunctions, positions: &[[f64; 3]]) -> Mat3<f64> {
         let mut j = [[0.0; 3]; 3];
         for (corner, node) in self.nodes().iter().enumerate() {
-            j = add_outer(&j, positions[*node as usize], at.1[corner]);
+            let (x, slope) = (positions[*node as usize], at.1[corner]);
+            // Without fused multiply-add: compiled for any processor, each one would be a call.
+            for r in 0..3 {
+                for c in 0..3 {
+                    j[r][c] += x[r] * slope[c];
+                }
+            }
         }
         j
     }
@@ -394,8 +401,9 @@ impl Particles {
         }
         check_shapes(&cells, &positions)?;
         let mut volumes = vec![0.0; positions.len()];
-        for cell in &cells {
-            for (node, v) in cell.nodes().iter().zip(cell.volumes(&positions)) {
+        let shares = parallel::fill(cells.len(), |c| cells[c].volumes(&positions));
+        for (cell, shares) in cells.iter().zip(shares) {
+            for (node, v) in cell.nodes().iter().zip(shares) {
                 volumes[*node as usize] += v;
             }
         }
@@ -421,8 +429,8 @@ impl Particles {
 pub(super) const FLAT: f64 = 1e-12;
 
 fn check_shapes(cells: &[Cell], positions: &[[f64; 3]]) -> Result<()> {
-    let bad = |c: &Cell| c.shape_measure(positions).is_nan() || c.shape_measure(positions) <= FLAT;
-    match cells.iter().position(bad) {
+    let good = parallel::fill(cells.len(), |c| cells[c].shape_measure(positions) > FLAT);
+    match good.iter().position(|good| !good) {
         None => Ok(()),
         Some(i) => {
             let [x, y, z] = positions[cells[i].nodes[0] as usize];
@@ -544,8 +552,9 @@ impl Mesh {
     /// Share of the full solid angle that the cells of each particle fill: 1 inside, 1/2 on a flat
     /// part of the surface.
     pub fn solid_angles(&self, positions: &[[f64; 3]]) -> Vec<f64> {
-        let mut angles = vec![0.0; positions.len()];
-        for cell in &self.cells {
+        let shares = parallel::fill(self.cells.len(), |cell| {
+            let cell = &self.cells[cell];
+            let mut shares = [0.0; 8];
             for (corner, &node) in cell.nodes().iter().enumerate() {
                 let x = positions[node as usize];
                 let [a, b, c] = cell.kind.edges_at(corner).map(|other| {
@@ -555,7 +564,14 @@ impl Mesh {
                 // Van Oosterom and Strackee (1983).
                 let volume = dot(a, cross(b, c)).abs();
                 let angle = volume.atan2(1.0 + dot(a, b) + dot(b, c) + dot(c, a));
-                angles[node as usize] += angle / (2.0 * std::f64::consts::PI);
+                shares[corner] = angle / (2.0 * std::f64::consts::PI);
+            }
+            shares
+        });
+        let mut angles = vec![0.0; positions.len()];
+        for (cell, shares) in self.cells.iter().zip(shares) {
+            for (node, share) in cell.nodes().iter().zip(shares) {
+                angles[*node as usize] += share;
             }
         }
         angles
