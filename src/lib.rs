@@ -19,6 +19,7 @@
 //! | Runge-Kutta, time step | 61-63 | `integrator`, `simulation` |
 //! | angular-momentum projection | 64-67 | `formulation::angular_momentum` |
 //! | supports, loads, heat, contact, resultants | | `boundary` |
+//! | pilot runs for a tolerance, observed order, error and its band | | [`accuracy`] |
 //!
 //! ```
 //! use urlsph::{Scene, Simulation};
@@ -35,6 +36,7 @@
 //! # Ok::<(), urlsph::Error>(())
 //! ```
 
+pub mod accuracy;
 mod boundary;
 pub mod error;
 pub mod ffi;

@@ -491,3 +491,129 @@ fn an_interrupted_run_has_status_130_and_whole_files() {
     let collection = fs::read_to_string(bench.path("r/fields.pvd")).unwrap();
     assert!(collection.ends_with("</VTKFile>\n"));
 }
+
+/// A run of the small column for an accuracy, in `r`.
+const FOR_ACCURACY: [&str; 7] = [
+    "run",
+    "scene.json",
+    "--out",
+    "r",
+    "--threads=1",
+    "--of=probe.tip.displacement",
+    "--tolerance",
+];
+
+#[test]
+fn accuracy_asked_for_is_predicted_run_and_reported() {
+    let bench = Bench::new();
+    let arguments = [&FOR_ACCURACY[..], &["4%"]].concat();
+    let printed = bench.succeeds(&arguments);
+    for word in [
+        "pilot 1 ",
+        "predicted ",
+        "final run ",
+        "estimated error ",
+        "within the tolerance of 4 %",
+        "closure error",
+    ] {
+        assert!(printed.contains(word), "{word} in:\n{printed}");
+    }
+    let text = fs::read_to_string(bench.path("r/accuracy.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(report["of"], "probe.tip.displacement");
+    assert_eq!(report["unit"], "m");
+    assert_eq!(report["met"], true);
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let estimate = &report["estimate"];
+    let band = ["low", "best", "high"].map(|end| number(&estimate[end]));
+    assert!(0.0 <= band[0] && band[0] <= band[1] && band[1] <= band[2] && band[2] <= 0.04);
+    let runs = report["runs"].as_array().unwrap();
+    assert!(runs.len() >= 5);
+    let last = runs.iter().rfind(|run| run["role"] == "final").unwrap();
+    assert!(number(&last["cost"]["cpu_seconds"]) > 0.0);
+
+    // The scene that lies beside it is the one that was run, and gives the same rows.
+    let rows = fs::read(bench.path("r/history.csv")).unwrap();
+    bench.succeeds(&["run", "r/scene.json", "--out", "again", "--quiet"]);
+    assert_eq!(fs::read(bench.path("again/history.csv")).unwrap(), rows);
+    // A plain run in the same folder leaves no estimate of another one behind.
+    bench.succeeds(&["run", "scene.json", "--out", "r", "--quiet"]);
+    assert!(!bench.path("r/accuracy.json").exists());
+
+    let quiet = bench.urlsph(&[&arguments[..], &["--quiet"]].concat());
+    assert!(quiet.status.success(), "{}", stderr(&quiet));
+    assert!(quiet.stdout.is_empty() && quiet.stderr.is_empty());
+}
+
+#[test]
+fn accuracy_that_cannot_be_had_is_refused_with_the_reason_and_the_remedy() {
+    let bench = Bench::new();
+    let with = |more: &[&'static str]| [&FOR_ACCURACY[..], more].concat();
+    for (arguments, words) in [
+        (
+            with(&["0.00001%", "--budget=0.5"]),
+            &["CPU seconds", "of the budget of 0.5", "--budget"][..],
+        ),
+        (
+            with(&["4%", "--set=numerics.time_step=1e-5"]),
+            &["numerics.time_step", "leave it out"],
+        ),
+        (
+            with(&["4%", "--set=probes={}"]),
+            &["probe.tip.displacement", "`probes`"],
+        ),
+    ] {
+        let message = bench.fails(1, &arguments);
+        for word in words {
+            assert!(message.contains(word), "{word} in: {message}");
+        }
+        assert!(!bench.path("r/history.csv").exists());
+    }
+    let mesh = meshed("bar_1.msh", "{}");
+    let message = mesh.fails(1, &with(&["4%"]));
+    assert!(message.contains("cannot be refined"), "{message}");
+
+    for (tolerance, word) in [
+        ("much", "such as 2%"),
+        ("0", "such as 2%"),
+        ("150%", "such as 2%"),
+    ] {
+        assert!(bench.fails(2, &with(&[tolerance])).contains(word));
+    }
+    for missing in [
+        &["--tolerance", "4%"][..],
+        &["--of", "probe.tip.displacement"],
+        &["--budget", "10"],
+    ] {
+        let arguments = [&["run", "scene.json", "--out", "r"], missing].concat();
+        let message = bench.fails(2, &arguments);
+        assert!(
+            message.contains("--of") || message.contains("--tolerance"),
+            "{message}"
+        );
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_pilot_has_status_130_and_leaves_no_results() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command(&[&FOR_ACCURACY[..], &["4%", "--until=1000"]].concat())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The handler is installed before the folder is made.
+    let patience = Instant::now() + Duration::from_secs(60);
+    while !bench.path("r").exists() {
+        assert!(Instant::now() < patience, "the pilots do not get going");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let killed = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(killed.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(fs::read_dir(bench.path("r")).unwrap().count(), 0);
+}

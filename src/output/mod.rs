@@ -10,6 +10,7 @@ mod vtu;
 
 pub use history::History;
 pub use recorder::Recorder;
+pub(crate) use recorder::{ACCURACY, ROUNDING, history_interval};
 pub use vtu::{Collection, write_vtu};
 
 use std::ffi::OsString;

@@ -8,10 +8,17 @@ use super::variables::{self, OutputVariable, Reader, selected_fields};
 use super::{Collection, History, io_error, replace_file, write_vtu};
 use crate::error::{Error, Result};
 use crate::fields::Field;
+use crate::scene::Scene;
 use crate::simulation::Simulation;
 
 /// Rows of the history unless the scene says how many.
 const DEFAULT_ROWS: f64 = 200.0;
+
+/// Interval of the history's rows [s].
+pub(crate) fn history_interval(scene: &Scene) -> f64 {
+    let own = scene.output.history_interval;
+    own.unwrap_or(scene.time.end / DEFAULT_ROWS)
+}
 
 /// Writes `history.csv`, `fields.pvd`, `fields/*.vtu` and `scene.json` into a folder.
 ///
@@ -74,10 +81,7 @@ impl Recorder {
             folder.join("history.csv"),
             variables.iter().flat_map(OutputVariable::element_names),
         )?;
-        let interval = scene
-            .output
-            .history_interval
-            .unwrap_or(scene.time.end / DEFAULT_ROWS);
+        let interval = history_interval(scene);
         let field_files = match scene.output.field_interval {
             Some(interval) => {
                 fs::create_dir_all(&field_folder)
@@ -175,8 +179,10 @@ impl Recorder {
 
 const STATE_FILE: &str = "state_";
 const LAST_STATE: &str = "last_good_state.vtu";
+/// What a run for an accuracy adds to the folder.
+pub(crate) const ACCURACY: &str = "accuracy.json";
 
-/// Removes the field files of an earlier run, which the new run would not overwrite if it writes fewer.
+/// Removes the files of an earlier run that the new run would not overwrite: it may write fewer fields.
 fn remove_earlier(folder: &Path, field_folder: &Path) -> Result<()> {
     let remove = |path: &Path| match fs::remove_file(path) {
         Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
@@ -186,6 +192,7 @@ fn remove_earlier(folder: &Path, field_folder: &Path) -> Result<()> {
     };
     remove(&folder.join("fields.pvd"))?;
     remove(&folder.join(LAST_STATE))?;
+    remove(&folder.join(ACCURACY))?;
     let Ok(entries) = fs::read_dir(field_folder) else {
         return Ok(());
     };
@@ -203,7 +210,7 @@ fn remove_earlier(folder: &Path, field_folder: &Path) -> Result<()> {
 }
 
 /// Share of an interval within which two instants are the same one: rounding, not physics.
-const ROUNDING: f64 = 1e-9;
+pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// The multiples of an interval: `k * interval`, never a running sum, so that rounding does not add up.
 #[derive(Debug)]

@@ -131,25 +131,35 @@ impl Lattice {
     }
 }
 
-/// Divides the axis between the bounds of all boxes.
-fn lattice_lines(boxes: &[(String, &BoxGeometry)], axis: usize) -> Vec<f64> {
+/// The pieces between the bounds of all boxes along an axis: from, to [m], and the cells of each.
+pub fn divisions(boxes: &[&BoxGeometry], axis: usize) -> Vec<(f64, f64, usize)> {
     let mut bounds: Vec<f64> = boxes
         .iter()
-        .flat_map(|(_, b)| [b.min[axis], b.max[axis]])
+        .flat_map(|b| [b.min[axis], b.max[axis]])
         .collect();
     bounds.sort_by(f64::total_cmp);
     let slack = 1e-9 * (bounds[bounds.len() - 1] - bounds[0]);
     bounds.dedup_by(|a, b| *a - *b <= slack);
-    let mut lines = vec![bounds[0]];
-    for pair in bounds.windows(2) {
+    let piece = |pair: &[f64]| {
         let (from, to) = (pair[0], pair[1]);
         let middle = 0.5 * (from + to);
         let cells = boxes
             .iter()
-            .filter(|(_, b)| b.min[axis] < middle && middle < b.max[axis])
-            .map(|(_, b)| ((to - from) / b.spacing.per_axis()[axis]).round().max(1.0) as usize)
+            .filter(|b| b.min[axis] < middle && middle < b.max[axis])
+            .map(|b| ((to - from) / b.spacing.per_axis()[axis]).round().max(1.0) as usize)
             .max()
             .unwrap_or(1);
+        (from, to, cells)
+    };
+    bounds.windows(2).map(piece).collect()
+}
+
+/// Divides the axis between the bounds of all boxes.
+fn lattice_lines(boxes: &[(String, &BoxGeometry)], axis: usize) -> Vec<f64> {
+    let boxes: Vec<&BoxGeometry> = boxes.iter().map(|(_, b)| *b).collect();
+    let pieces = divisions(&boxes, axis);
+    let mut lines = vec![pieces[0].0];
+    for (from, to, cells) in pieces {
         for i in 1..=cells {
             let s = i as f64 / cells as f64;
             lines.push(if i == cells {

@@ -17,7 +17,7 @@ use crate::math::*;
 use crate::scene::{Geometry, PatchSelection, Scene};
 
 pub use gmsh::MeshFile;
-pub use lattice::Lattice;
+pub use lattice::{Lattice, divisions as lattice_divisions};
 pub use mesh::{Mesh, MeshSummary, Sharing};
 
 /// The points of a body, in the body's order, which keeps neighbours close in memory.

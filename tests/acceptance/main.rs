@@ -2,6 +2,7 @@
 //! laws. Every check prints its residual and tolerance (`cargo test --release --test acceptance --
 //! --nocapture`); `cargo xtask validate` runs the long ones, which are ignored here.
 
+mod accuracy;
 mod cable;
 #[path = "../cases/mod.rs"]
 mod cases;

@@ -131,9 +131,9 @@ pub const COPPER: Case = Case {
 };
 
 /// A value that is known within an uncertainty.
-struct Known {
-    value: f64,
-    within: f64,
+pub struct Known {
+    pub value: f64,
+    pub within: f64,
 }
 
 // The Johnson-Cook bar of 298.15 K has no reference but its own refinement: what is added to 7,280 particles
@@ -143,7 +143,7 @@ const RADIUS: Known = Known {
     value: 7.46e-3,
     within: 0.06e-3,
 };
-const LENGTH: Known = Known {
+pub const LENGTH: Known = Known {
     value: 19.14e-3,
     within: 0.04e-3,
 };

@@ -1,5 +1,6 @@
 //! The command line: `urlsph run | check | schema | fmu`.
 
+mod accuracy;
 mod check;
 mod run;
 

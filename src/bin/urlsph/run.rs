@@ -12,24 +12,27 @@ use urlsph::output::Recorder;
 use urlsph::{Code, Control, Energies, Error, Progress, Result, Simulation};
 
 use crate::SceneArguments;
+use crate::accuracy::{self, Accuracy};
 use crate::check::grouped;
 
 #[derive(Args)]
 pub struct Run {
     #[command(flatten)]
-    scene: SceneArguments,
+    pub scene: SceneArguments,
     /// Folder of the results, made if missing; an earlier run in it is replaced.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub out: PathBuf,
     /// Threads; as many as the machine has cores unless given.
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
-    threads: usize,
+    pub threads: usize,
     /// End of the run [s]: the same as `--set time.end=T`.
     #[arg(long, value_name = "T")]
     until: Option<String>,
     /// Prints errors only.
     #[arg(long)]
-    quiet: bool,
+    pub quiet: bool,
+    #[command(flatten)]
+    pub accuracy: Accuracy,
 }
 
 impl Run {
@@ -37,63 +40,66 @@ impl Run {
         if let Some(end) = self.until.take() {
             self.scene.overrides.push(format!("time.end={end}"));
         }
+        if self.accuracy.tolerance.is_some() {
+            return accuracy::execute(&self);
+        }
         let mut simulation = Simulation::with_threads(self.scene.load()?, self.threads)?;
         let mut recorder = Recorder::create(&self.out, &simulation)?;
         let interrupted = watch_interrupts()?;
         let start = Instant::now();
         let initial = simulation.energies();
-        let bar = Bar::new(&simulation, self.quiet);
-        let outcome = march(&mut simulation, &mut recorder, &bar, &interrupted);
-        bar.finish();
-        if let Err(error) = outcome {
-            return Err(Self::explain(error, &simulation, &mut recorder));
-        }
+        let bar = Bar::new(&simulation, "", self.quiet);
+        march(
+            &mut simulation,
+            &mut recorder,
+            &bar,
+            &interrupted,
+            &mut |_| Ok(()),
+        )?;
         if !self.quiet {
             crate::print(&summary(&simulation, &recorder, initial, start.elapsed()))?;
         }
         Ok(())
     }
-
-    /// What became of a run that ended early: its last state is written, and the message says where.
-    fn explain(error: Error, simulation: &Simulation, recorder: &mut Recorder) -> Error {
-        if !matches!(error.code(), Code::Diverged | Code::Cancelled) {
-            return error;
-        }
-        match recorder.record_last_state(simulation) {
-            Ok(path) => error.with_note(&format!(
-                "the last good state, time {:.6e} s, is in {}",
-                simulation.time(),
-                path.display()
-            )),
-            Err(output) => error.with_note(&format!("its last good state is lost, too: {output}")),
-        }
-    }
 }
 
-/// Advances from one instant of output to the next, up to the scene's end.
-fn march(
+/// Advances from one instant of output to the next, up to the scene's end. `also` sees the simulation
+/// at each of them.
+pub fn march(
     simulation: &mut Simulation,
     recorder: &mut Recorder,
     bar: &Bar,
     interrupted: &AtomicBool,
+    also: &mut dyn FnMut(&Simulation) -> Result<()>,
 ) -> Result<()> {
-    recorder.record(simulation)?;
-    while let Some(time) = recorder.next_time() {
-        simulation.advance_with(time, &mut |progress| {
-            bar.update(progress);
-            if interrupted.load(Ordering::Relaxed) {
-                Control::Cancel
-            } else {
-                Control::Continue
-            }
-        })?;
-        recorder.record(simulation)?;
+    let mut outcome = recorder.record(simulation).and_then(|()| also(simulation));
+    while let (Ok(()), Some(time)) = (&outcome, recorder.next_time()) {
+        outcome = simulation
+            .advance_with(time, &mut |progress| bar.watch(progress, interrupted))
+            .and_then(|()| recorder.record(simulation))
+            .and_then(|()| also(simulation));
     }
-    Ok(())
+    bar.finish();
+    outcome.map_err(|error| explain(error, simulation, recorder))
+}
+
+/// What became of a run that ended early: its last state is written, and the message says where.
+fn explain(error: Error, simulation: &Simulation, recorder: &mut Recorder) -> Error {
+    if !matches!(error.code(), Code::Diverged | Code::Cancelled) {
+        return error;
+    }
+    match recorder.record_last_state(simulation) {
+        Ok(path) => error.with_note(&format!(
+            "the last good state, time {:.6e} s, is in {}",
+            simulation.time(),
+            path.display()
+        )),
+        Err(output) => error.with_note(&format!("its last good state is lost, too: {output}")),
+    }
 }
 
 /// A flag that Ctrl-C raises; the run then ends after its present step. A second Ctrl-C kills.
-fn watch_interrupts() -> Result<Arc<AtomicBool>> {
+pub fn watch_interrupts() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     ctrlc::set_handler(move || {
@@ -106,7 +112,7 @@ fn watch_interrupts() -> Result<Arc<AtomicBool>> {
 }
 
 /// The progress bar on standard error; where that is no terminal, nothing is drawn.
-struct Bar {
+pub struct Bar {
     bar: ProgressBar,
     particles: f64,
     end: f64,
@@ -117,21 +123,34 @@ struct Bar {
 const PARTS: f64 = 10_000.0;
 
 impl Bar {
-    fn new(simulation: &Simulation, quiet: bool) -> Self {
+    /// A bar of a simulation; `what` stands before its numbers.
+    pub fn new(simulation: &Simulation, what: &str, quiet: bool) -> Self {
         let target = if quiet {
             ProgressDrawTarget::hidden()
         } else {
             ProgressDrawTarget::stderr()
         };
         let style = ProgressStyle::with_template(
-            "{bar:30} {percent:>3} %  {msg}  elapsed {elapsed}, ETA {eta}",
+            "{prefix}{bar:30} {percent:>3} %  {msg}  elapsed {elapsed}, ETA {eta}",
         )
         .expect("the template is fixed and valid");
+        let bar = ProgressBar::with_draw_target(Some(PARTS as u64), target).with_style(style);
+        bar.set_prefix(what.to_owned());
         Self {
-            bar: ProgressBar::with_draw_target(Some(PARTS as u64), target).with_style(style),
+            bar,
             particles: simulation.particle_count() as f64,
             end: simulation.scene().time.end,
             start: Instant::now(),
+        }
+    }
+
+    /// Shows where a run is; what it is to do next.
+    pub fn watch(&self, progress: &Progress, interrupted: &AtomicBool) -> Control {
+        self.update(progress);
+        if interrupted.load(Ordering::Relaxed) {
+            Control::Cancel
+        } else {
+            Control::Continue
         }
     }
 
@@ -148,7 +167,7 @@ impl Bar {
             .set_position((PARTS * progress.time / self.end) as u64);
     }
 
-    fn finish(&self) {
+    pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }
@@ -158,7 +177,7 @@ fn particle_steps_per_second(particles: f64, steps: u64, elapsed: Duration) -> f
 }
 
 /// What a finished run comes to.
-fn summary(
+pub fn summary(
     simulation: &Simulation,
     recorder: &Recorder,
     initial: Energies,
