@@ -134,6 +134,7 @@ impl Simulation {
     /// As [`new`](Self::new).
     pub fn with_threads(scene: Scene, threads: usize) -> Result<Self> {
         scene.validate()?;
+        let scene = scene.with_preset()?;
         let pool = Pool::new(threads)?;
         let particles = pool.install(|| Particles::new(&scene))?;
         let boundary = Boundary::new(&scene, &particles)?;

@@ -1016,3 +1016,36 @@ fn the_scenes_of_the_readme_are_valid() {
         ["box", "boxes", "cylinder", "perforated_box", "mesh"]
     );
 }
+
+/// A preset makes the cells larger or smaller once, and leaves a scene that says so itself.
+#[test]
+fn presets_change_the_cells() {
+    let cells = |preset: &str| {
+        let scene = Scene::from_json(COLUMN, &[format!("preset={preset}")]).expect("a good scene");
+        assert_eq!(scene.preset, None);
+        let text = serde_json::to_string(&scene).expect("scenes are JSON");
+        assert_eq!(Scene::from_json(&text, &[]).expect("a good scene"), scene);
+        Simulation::with_threads(scene, 1)
+            .expect("it can be set up")
+            .particle_count()
+    };
+    let own = Simulation::with_threads(Scene::from_json(COLUMN, &[]).expect("good"), 1)
+        .expect("it can be set up")
+        .particle_count();
+    assert_eq!(cells("balanced"), own);
+    println!("{} {own} {} particles", cells("fast"), cells("accurate"));
+    assert_eq!(cells("fast"), 4 * 17 * 4);
+    assert_eq!(cells("accurate"), 7 * 37 * 7);
+    for (overrides, path) in [
+        (vec!["preset=best"], "preset"),
+        (
+            vec!["preset=fast", "numerics.time_step=1e-5"],
+            "numerics.time_step",
+        ),
+    ] {
+        let overrides: Vec<String> = overrides.into_iter().map(str::to_owned).collect();
+        let error = Scene::from_json(COLUMN, &overrides).expect_err("refused");
+        println!("{error}");
+        assert!(error.to_string().contains(path));
+    }
+}

@@ -10,6 +10,7 @@ mod heat;
 mod material;
 mod numerics;
 mod parse;
+mod preset;
 mod schema;
 mod tree;
 mod validate;
@@ -35,6 +36,7 @@ pub use numerics::{
     Limiter, Neighbours, Numerics, Operators, Reconstruction, ReferenceUpdate, StateMeasures,
     Weights,
 };
+pub use preset::Preset;
 pub use schema::json_schema;
 pub use value::{Interpolation, Scalar, ScalarFunction, Table, Vector, VectorFunction};
 
@@ -47,6 +49,10 @@ pub struct Scene {
     /// Name shown in pictures, summaries and the FMU.
     #[serde(default)]
     pub title: String,
+    /// Cells larger or smaller than the geometry's: `fast`, `balanced` (the default), `accurate`. It is applied when the
+    /// scene is read, which then has other cells and no preset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preset: Option<Preset>,
     /// The body.
     pub geometry: Geometry,
     /// The constitutive law of the body.
@@ -136,8 +142,8 @@ impl Scene {
             .geometry
             .load(folder)
             .and_then(|()| scene.validate())
-            .map_err(|e| parse::with_override(e, overrides))?;
-        Ok(scene)
+            .and_then(|()| scene.with_preset())
+            .map_err(|e| parse::with_override(e, overrides))
     }
 
     /// The same scene with other overrides, and the files that this one has read: they may be gone.
@@ -147,8 +153,8 @@ impl Scene {
         scene.geometry.adopt(&self.geometry);
         scene
             .validate()
-            .map_err(|e| parse::with_override(e, overrides))?;
-        Ok(scene)
+            .and_then(|()| scene.with_preset())
+            .map_err(|e| parse::with_override(e, overrides))
     }
 
     /// Whether overrides of material, heat and numerics are admissible, each by itself: what they have

@@ -61,11 +61,20 @@ struct SceneArguments {
     /// Replaces a value of the scene, such as `geometry.box.spacing=0.125`; may be given several times.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     overrides: Vec<String>,
+    /// Cells beside the scene's: fast, balanced or accurate. The same as `--set preset=NAME`.
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
 }
 
 impl SceneArguments {
     fn load(&self) -> Result<Scene> {
-        Scene::from_file(&self.file, &self.overrides)
+        Scene::from_file(&self.file, &self.overrides())
+    }
+
+    /// All that the command line sets.
+    fn overrides(&self) -> Vec<String> {
+        let preset = self.preset.iter().map(|name| format!("preset={name}"));
+        self.overrides.iter().cloned().chain(preset).collect()
     }
 }
 
