@@ -158,6 +158,9 @@ pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec
         ReferenceUpdate::Every(steps) => {
             format!("reference update every {steps} steps, kernel option {option}")
         }
+        ReferenceUpdate::When { strain } => {
+            format!("reference update at a strain of {strain}, kernel option {option}")
+        }
     };
     feature(n.reference_update != ReferenceUpdate::Never, update);
     feature(

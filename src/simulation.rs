@@ -4,6 +4,7 @@ use crate::boundary::{Approach, Boundary, Input, InputValues, Patch, Quantity, W
 use crate::error::{Code, Error, Result};
 use crate::fields::Field;
 use crate::formulation::angular_momentum;
+use crate::formulation::staleness::is_strained;
 use crate::formulation::url::{Breakdown, Evaluation, State, Trouble, Url};
 use crate::integrator::{ANGULAR_ARMS, SSP_RK3};
 use crate::layout::{Array, Layout};
@@ -54,6 +55,7 @@ pub struct Simulation {
     evaluation: Evaluation,
     resultants: Resultants,
     generation: u64,
+    updates: u64,
     /// Length that bounds the step at time 0 [m].
     first_length: f64,
 }
@@ -172,6 +174,7 @@ impl Simulation {
             evaluation: Evaluation::default(),
             resultants: Resultants::default(),
             generation: 0,
+            updates: 0,
             first_length: 0.0,
             scene,
         };
@@ -290,6 +293,11 @@ impl Simulation {
     /// Time steps since time 0.
     pub fn steps(&self) -> u64 {
         self.steps
+    }
+
+    /// Updates of the reference configuration that were made; a return to a saved state takes none away.
+    pub fn reference_updates(&self) -> u64 {
+        self.updates
     }
 
     /// Number of particles.
@@ -478,6 +486,7 @@ impl Simulation {
             approach,
             url,
             start,
+            updates,
             ..
         } = self;
         let before = self.velocity_before.as_mut();
@@ -542,9 +551,10 @@ impl Simulation {
                 let now = (next, supplied);
                 accounts.heat_in +=
                     stage.carry * hold_temperatures(boundary, url, state, reference, now, inputs)?;
-                if last && is_stale(numerics, steps) {
+                if last && is_stale(numerics, steps, state) {
                     url.update_reference(state, reference)
                         .map_err(|b| diverged(b, state))?;
+                    *updates += 1;
                 }
                 let elapsed = (!last).then_some(next - time);
                 *evaluation = url
@@ -1124,11 +1134,12 @@ pub(crate) fn initial_state(
 }
 
 /// Whether the reference is updated after this step.
-fn is_stale(numerics: &Numerics, steps: u64) -> bool {
+fn is_stale(numerics: &Numerics, steps: u64, state: &State) -> bool {
     match numerics.reference_update {
         ReferenceUpdate::Never => false,
         ReferenceUpdate::EveryStep => true,
         ReferenceUpdate::Every(n) => steps.is_multiple_of(u64::from(n)),
+        ReferenceUpdate::When { strain } => is_strained(state, strain),
     }
 }
 

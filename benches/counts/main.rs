@@ -150,10 +150,15 @@ fn count_scene(name: &str) -> Result<SceneCount> {
     Ok(SceneCount {
         scene: name.to_owned(),
         particles: body.particles,
-        per_particle_step: instructions / body.particles as f64,
-        per_pair_update: instructions / (Meter::STAGES * body.pairs) as f64,
-        bytes_per_particle: body.bytes as f64 / body.particles as f64,
+        per_particle_step: (instructions / body.particles as f64).round(),
+        per_pair_update: tenths(instructions / (Meter::STAGES * body.pairs) as f64),
+        bytes_per_particle: tenths(body.bytes as f64 / body.particles as f64),
     })
+}
+
+/// To the digits that mean something: the file changes with the code, not with every count.
+fn tenths(value: f64) -> f64 {
+    (10.0 * value).round() / 10.0
 }
 
 /// Size of a scene's body.

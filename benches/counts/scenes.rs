@@ -57,6 +57,8 @@ const HEAT: &str = r#"heat={
     "specific_heat": 383, "reference_temperature": 293, "conductivity": 10, "gruneisen_coefficient": 0.1
 }"#;
 const JITTER: &str = r#"geometry.box.jitter={"fraction": 0.2}"#;
+/// More strain than the few steps that are counted reach.
+const STRAINED: &str = r#"numerics.reference_update={"when": {"strain": 0.2}}"#;
 const EVERY_STEP: &str = "numerics.reference_update=every_step";
 
 pub const SCENES: &[Counted] = &[
@@ -80,6 +82,14 @@ pub const SCENES: &[Counted] = &[
         "update at every step, kernel option 3",
         &[EVERY_STEP, "numerics.kernel_option=3"],
     ),
+    guarded(
+        "update at a strain, kernel option 1, no update",
+        &[STRAINED],
+    ),
+    guarded(
+        "update at a strain, kernel option 3, no update",
+        &[STRAINED, "numerics.kernel_option=3"],
+    ),
     guarded("without dissipation", &["numerics.dissipation=false"]),
     guarded("first order", &["numerics.reconstruction=none"]),
     guarded("minmod limiter", &["numerics.limiter=minmod"]),
@@ -97,6 +107,10 @@ pub const SCENES: &[Counted] = &[
     guarded(
         "20 % jitter, repaired, update at every step, kernel option 3",
         &[JITTER, EVERY_STEP, "numerics.kernel_option=3"],
+    ),
+    guarded(
+        "20 % jitter, repaired, update at a strain, kernel option 3, no update",
+        &[JITTER, STRAINED, "numerics.kernel_option=3"],
     ),
     guarded(
         "20 % jitter, operators of the mesh",

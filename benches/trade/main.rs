@@ -162,6 +162,7 @@ impl Run {
             pairs: simulation.pair_count(),
             cfl: simulation.cfl_number(),
             steps: meter.steps,
+            reference_updates: simulation.reference_updates(),
             pair_updates: meter.pair_updates,
             setup_seconds,
             seconds: meter.seconds,

@@ -374,7 +374,7 @@ def html(results, cases):
 
 COLUMNS = [
     "case", "axis", "setting", "size", "cells", "status", "quantity", "error", "uncertainty", "particles", "pairs",
-    "steps", "pair_updates", "setup_seconds", "seconds", "time", "overrides", "reason",
+    "steps", "reference_updates", "pair_updates", "setup_seconds", "seconds", "time", "overrides", "reason",
 ]  # fmt: skip
 
 

@@ -9,6 +9,8 @@ pub type Axis = (&'static str, &'static [Setting]);
 /// The scene as it is.
 pub const OWN: Setting = ("as the scene", &[]);
 
+/// At the strain that the schema proposes.
+const STRAINED: &str = "numerics.reference_update={\"when\": {}}";
 const EVERY_STEP: &str = "numerics.reference_update=every_step";
 
 /// A new setting, or a new axis, is one entry here.
@@ -54,6 +56,7 @@ pub const AXES: &[Axis] = &[
                 &["numerics.reference_update={\"every\": 10}"],
             ),
             ("updated every step", &[EVERY_STEP]),
+            ("updated when strained", &[STRAINED]),
             (
                 "every step, kernel option 2",
                 &[EVERY_STEP, "numerics.kernel_option=2"],
@@ -65,6 +68,22 @@ pub const AXES: &[Axis] = &[
             (
                 "every step, kernel option 4",
                 &[EVERY_STEP, "numerics.kernel_option=4"],
+            ),
+            (
+                "when strained, kernel option 3",
+                &[STRAINED, "numerics.kernel_option=3"],
+            ),
+            (
+                "when strained, kernel option 4",
+                &[STRAINED, "numerics.kernel_option=4"],
+            ),
+            (
+                "when strained, option 3, repaired",
+                &[
+                    STRAINED,
+                    "numerics.kernel_option=3",
+                    "numerics.operators=repaired",
+                ],
             ),
             (
                 "every step, option 3, repaired",

@@ -8,5 +8,6 @@ mod laws;
 pub mod limiter;
 mod passes;
 pub mod riemann;
+pub mod staleness;
 mod sweep;
 pub mod url;

@@ -71,7 +71,9 @@ impl Kernels<'_> {
         let per_length = T::splat(token, 1.0 / self.unit);
         let (r, f_inverse) = pull_back::<T>(token, &self.f_chi, &self.chi, a, b);
         let length = dot(r, r).sqrt() * per_length;
-        let [ha, hb] = [a, b].map(|at| T::load(token, self.h, at) * per_length);
+        // One by one: the compiler may leave the closure of a `map` over both a call, without vectors.
+        let ha = T::load(token, self.h, a) * per_length;
+        let hb = T::load(token, self.h, b) * per_length;
         (
             r,
             f_inverse,

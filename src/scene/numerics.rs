@@ -157,7 +157,7 @@ pub enum Weights {
 }
 
 /// When the reference configuration is updated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ReferenceUpdate {
     /// Never: total Lagrangian.
@@ -166,6 +166,20 @@ pub enum ReferenceUpdate {
     EveryStep,
     /// After every n steps.
     Every(#[schemars(range(min = 1))] u32),
+    /// After a step that takes a particle beyond a strain since the last update.
+    When {
+        /// Norm of the Green-Lagrange strain 1/2 (f^T f - I) since the last update, in which rotations do
+        /// not count: above 0 and below 0.5, which is all that compression along one axis reaches.
+        #[serde(default = "default_strain")]
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
+        strain: f64,
+    },
+}
+
+/// From `examples/updates.md`: kernels that are recomputed on the default operators of a lattice dissipate
+/// the more the more often that is done, and from 0.2 on about as little as those of the initial configuration.
+fn default_strain() -> f64 {
+    0.2
 }
 
 /// Which incremental deformation measures are independent unknowns.
@@ -279,6 +293,13 @@ pub(super) fn validate(n: &Numerics) -> Result<()> {
         "numerics.reference_update.every",
         "expected at least 1 step between updates instead of 0; `never` is total Lagrangian",
     )?;
+    if let ReferenceUpdate::When { strain } = n.reference_update {
+        require(
+            strain > 0.0 && strain < 0.5,
+            "numerics.reference_update.when.strain",
+            &format!("expected more than 0 and less than 0.5 instead of {strain}"),
+        )?;
+    }
     require(
         n.volume_dissipation.is_finite() && n.volume_dissipation >= 0.0,
         "numerics.volume_dissipation",

@@ -23,3 +23,4 @@ mod stability;
 mod support;
 mod swinging_cube;
 mod thermo_wave;
+mod updates;

@@ -83,6 +83,21 @@ const VARIANTS: &[(&str, &[&str])] = &[
             "numerics.dissipation=false",
         ],
     ),
+    (
+        "column_twisting",
+        &[
+            "numerics.kernel_option=3",
+            "numerics.reference_update={\"when\": {\"strain\": 0.02}}",
+        ],
+    ),
+    (
+        "column_bending",
+        &[
+            JITTERED[0],
+            "numerics.kernel_option=4",
+            "numerics.reference_update={\"when\": {\"strain\": 0.02}}",
+        ],
+    ),
     ("l_block", &[]),
     ("elastic_cube", &["numerics.neighbours={\"radius\": 2.1}"]),
     ("swinging_cube", &[]),

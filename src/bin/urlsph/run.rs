@@ -210,6 +210,10 @@ pub fn summary(
             }
         ),
     );
+    if simulation.reference_updates() > 0 {
+        let updates = grouped(simulation.reference_updates());
+        line("reference", format!("updated {updates} times"));
+    }
     let stored = |e: &Energies| e.kinetic + e.strain + e.thermal;
     // What the scene does not have stays 0 and is left out.
     let optional = |value: f64| (value != 0.0).then_some(value);
