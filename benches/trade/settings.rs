@@ -17,6 +17,13 @@ const EVERY_STEP: &str = "numerics.reference_update=every_step";
 pub const AXES: &[Axis] = &[
     ("scene", &[OWN]),
     (
+        "preset",
+        &[
+            ("fast", &["preset=fast"]),
+            ("accurate", &["preset=accurate"]),
+        ],
+    ),
+    (
         "neighbours",
         &[
             ("6 neighbours", &["numerics.neighbours=6"]),
