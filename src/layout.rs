@@ -172,6 +172,12 @@ impl<const N: usize> Array<N> {
             bytemuck::must_cast_slice_mut(&mut component[1 + slices.start..1 + slices.end])
         })
     }
+    /// Repeats some slices from slice `at` on.
+    pub fn repeat(&mut self, slices: Range<usize>, at: usize) {
+        for component in self.data.chunks_exact_mut(self.layout.stride()) {
+            component.copy_within(1 + slices.start..1 + slices.end, 1 + at);
+        }
+    }
     /// Sets every slot, guards included.
     pub fn fill(&mut self, value: f64) {
         self.data.fill(Slots([value; SLICE]));

@@ -375,18 +375,14 @@ pub(super) struct ForceInput<'a> {
     s: [&'a [f64]; 9],
     half_grad: [&'a [f64]; 9],
     wave: [&'a [f64]; 2],
-    /// What is taken off a slot for its place in q, s, half_grad and wave.
-    base: usize,
+    /// Slot that stands first in q, s, half_grad and wave, and what the distance to it is cut to in a ring.
+    first: usize,
+    mask: usize,
 }
 
 impl<'a> ForceInput<'a> {
-    /// Of the particles of a block that begins `slices` slices after the body.
-    pub(super) fn new(
-        state: &'a State,
-        reference: &'a Reference,
-        block: &'a Block,
-        slices: usize,
-    ) -> Self {
+    /// With the block of the whole body.
+    pub(super) fn new(state: &'a State, reference: &'a Reference, block: &'a Block) -> Self {
         let tensors =
             |array: &'a Option<Array<9>>| array.as_ref().map_or([&[][..]; 9], Array::components);
         Self {
@@ -397,8 +393,24 @@ impl<'a> ForceInput<'a> {
             s: tensors(&block.s),
             half_grad: tensors(&block.half_grad),
             wave: block.wave.components(),
-            base: slices * SLICE,
+            first: Layout::FIRST,
+            mask: usize::MAX,
         }
+    }
+
+    /// The same where the block is a ring of so many slices, a power of two, which begins with the slot `first`.
+    pub(super) fn in_ring(self, first: usize, capacity: usize) -> Self {
+        Self {
+            first,
+            mask: capacity * SLICE - 1,
+            ..self
+        }
+    }
+
+    /// Place of a slot in q, s, half_grad and wave.
+    #[inline(always)]
+    fn place(&self, slot: usize) -> usize {
+        ((slot - self.first) & self.mask) + Layout::FIRST
     }
 
     /// The same, and pair vectors, made to show that what a mode reads holds as many slots: one check of
@@ -431,19 +443,19 @@ impl<'a> ForceInput<'a> {
     /// Q_a.
     #[inline(always)]
     fn stress<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
-        load9(token, &self.q, a - self.base)
+        load9(token, &self.q, self.place(a))
     }
 
     /// Half the velocity gradient.
     #[inline(always)]
     fn half_grad<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
-        load9(token, &self.half_grad, a - self.base)
+        load9(token, &self.half_grad, self.place(a))
     }
 
     /// S_a.
     #[inline(always)]
     pub(super) fn area<T: Lane>(&self, token: T::Token, a: usize) -> Mat3<T> {
-        load9(token, &self.s, a - self.base)
+        load9(token, &self.s, self.place(a))
     }
 
     /// c_ab [m^2], from S_a and the pair vectors.
@@ -463,8 +475,8 @@ impl<'a> ForceInput<'a> {
         Here {
             x: load3(token, &self.x, a),
             v: load3(token, &self.v, a),
-            stretch: T::load(token, self.wave[0], a - self.base),
-            density: T::load(token, self.wave[1], a - self.base),
+            stretch: T::load(token, self.wave[0], self.place(a)),
+            density: T::load(token, self.wave[1], self.place(a)),
         }
     }
 
@@ -502,8 +514,8 @@ impl<'a> ForceInput<'a> {
             dx,
             dv: sub3(load3(token, &self.v, b), here.v),
             dx2: dot(dx, dx),
-            stretch: half * (here.stretch + T::load(token, self.wave[0], b - self.base)),
-            density: half * (here.density + T::load(token, self.wave[1], b - self.base)),
+            stretch: half * (here.stretch + T::load(token, self.wave[0], self.place(b))),
+            density: half * (here.density + T::load(token, self.wave[1], self.place(b))),
             area: zero3(token),
         }
     }

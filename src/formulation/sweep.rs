@@ -88,22 +88,32 @@ impl Block {
             .collect()
     }
 
-    /// Takes over the first slices of another block, to stand from `at` on.
-    fn copy_from(&mut self, other: &Self, at: usize, slices: usize) {
-        fn copy<const N: usize>(to: &mut Array<N>, from: &Array<N>, at: usize, slices: usize) {
-            for (to, from) in std::iter::zip(to.part_mut(at..at + slices), from.part(0..slices)) {
-                to.copy_from_slice(from);
+    /// Takes over slices of another block, or of this one, to stand from `at` on.
+    fn copy_from(&mut self, other: Option<&Self>, slices: Range<usize>, at: usize) {
+        fn copy<const N: usize>(
+            to: &mut Array<N>,
+            from: Option<&Array<N>>,
+            slices: Range<usize>,
+            at: usize,
+        ) {
+            match from {
+                Some(from) => {
+                    let to = to.part_mut(at..at + slices.len());
+                    for (to, from) in std::iter::zip(to, from.part(slices)) {
+                        to.copy_from_slice(from);
+                    }
+                }
+                None => to.repeat(slices, at),
             }
         }
-        copy(&mut self.q, &other.q, at, slices);
-        copy(&mut self.wave, &other.wave, at, slices);
-        for (to, from) in [
-            (&mut self.s, &other.s),
-            (&mut self.half_grad, &other.half_grad),
-        ] {
-            if let (Some(to), Some(from)) = (to, from) {
-                copy(to, from, at, slices);
-            }
+        copy(&mut self.q, other.map(|o| &o.q), slices.clone(), at);
+        copy(&mut self.wave, other.map(|o| &o.wave), slices.clone(), at);
+        if let Some(s) = &mut self.s {
+            copy(s, other.and_then(|o| o.s.as_ref()), slices.clone(), at);
+        }
+        if let Some(half_grad) = &mut self.half_grad {
+            let other = other.and_then(|o| o.half_grad.as_ref());
+            copy(half_grad, other, slices, at);
         }
     }
 
@@ -130,15 +140,45 @@ impl Block {
     }
 }
 
+/// A block of the slices that a chunk's forces are about to need, as a ring: slice i stands at i modulo the capacity.
+#[derive(Debug)]
+struct Window {
+    block: Block,
+    /// Slices, a power of two; behind them the first one stands once more, for reads across the end.
+    capacity: usize,
+}
+
+impl Window {
+    /// Writes slices, in runs that the ring does not break: `write(block, slices, at)`.
+    fn write<E>(
+        &mut self,
+        slices: Range<usize>,
+        longest: usize,
+        mut write: impl FnMut(&mut Block, Range<usize>, usize) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut start = slices.start;
+        while start < slices.end {
+            let at = start % self.capacity;
+            let end = slices.end.min(start + longest.min(self.capacity - at));
+            write(&mut self.block, start..end, at)?;
+            if at == 0 {
+                self.block.copy_from(None, 0..1, self.capacity);
+            }
+            start = end;
+        }
+        Ok(())
+    }
+}
+
 /// Where blocks are kept.
 #[derive(Debug)]
 enum Store {
     /// Of the whole body at once, for passes over all neighbours that need them.
     Whole(Block),
-    /// Of the head of each chunk; and of a chunk and the next one's head, for each thread.
+    /// Of the head of each chunk; and of what is needed next, for each thread.
     Chunks {
         heads: Vec<Block>,
-        windows: PerThread<Block>,
+        windows: PerThread<Window>,
     },
 }
 
@@ -211,6 +251,24 @@ impl Ends {
                 sum.iter_mut().zip(before).for_each(|(s, b)| *s += *b);
             }
         });
+    }
+}
+
+/// A chunk, and what was found of heads before.
+struct Chunk<'a> {
+    /// First slot, and slices.
+    range: (usize, usize),
+    /// Slices that pairs reach, at most.
+    reach: usize,
+    /// Block and slices of its head and of the next one's, if it is not the last.
+    head: (&'a Block, usize),
+    next: Option<(&'a Block, usize)>,
+}
+
+impl Chunk<'_> {
+    /// Slices behind it that its pairs may reach.
+    fn behind(&self) -> usize {
+        self.next.map_or(0, |(_, slices)| slices)
     }
 }
 
@@ -302,25 +360,20 @@ impl Passes<'_> {
         })
     }
 
-    /// The same of some slices of a chunk that begins in the slot `first`, tile by tile.
+    /// The same of some slices of a chunk that begins in the slot `first`; in the block they stand from `at` on.
     fn points_of_chunk<R: Runner>(
         &self,
         first: usize,
         slices: Range<usize>,
         kept: &mut Kept,
-        block: &mut Block,
+        (block, at): (&mut Block, usize),
     ) -> Result<Evaluation, Breakdown> {
-        let mut total = Evaluation::NONE;
-        for start in slices.clone().step_by(TILE) {
-            let tile = start..slices.end.min(start + TILE);
-            let run = (first + start * SLICE, tile.len());
-            let out = PointOutput {
-                kept: kept.part(tile.clone()),
-                block: block.part_mut(tile),
-            };
-            total.add(&self.points::<R>(run, out)?);
-        }
-        Ok(total)
+        let run = (first + slices.start * SLICE, slices.len());
+        let out = PointOutput {
+            block: block.part_mut(at..at + slices.len()),
+            kept: kept.part(slices),
+        };
+        self.points::<R>(run, out)
     }
 
     /// Force pass of a run of slices that begins in a chunk at the place `from`.
@@ -358,29 +411,64 @@ impl Passes<'_> {
         }
     }
 
-    /// All passes of a chunk whose head, and whatever its pairs reach behind it, stand in the window.
+    /// All passes of a chunk but the point pass of its head, which was made before, as that of the next one's was.
     fn chunk<R: Runner>(
         &self,
-        (first, slices): (usize, usize),
-        (head, reach): (usize, usize),
-        window: &mut Block,
+        chunk: &Chunk,
+        window: &mut Window,
         (mut kept, mut sums): (Kept, Sums),
     ) -> Result<Evaluation, Breakdown> {
         sums.clear();
-        let before = first / SLICE - Layout::FIRST / SLICE;
+        let (first, slices) = chunk.range;
         let mut total = Evaluation::NONE;
-        let mut ready = head;
+        let mut ready = 0;
         for start in (0..slices).step_by(TILE) {
             let end = slices.min(start + TILE);
-            let needed = slices.min(end + reach);
-            if needed > ready {
-                let points = self.points_of_chunk::<R>(first, ready..needed, &mut kept, window)?;
-                total.add(&points);
-                ready = needed;
-            }
-            let input = ForceInput::new(self.state, self.reference, window, before);
+            let needed = (end + chunk.reach).min(slices + chunk.behind());
+            total.add(&self.fill::<R>(chunk, ready..needed.max(ready), window, &mut kept)?);
+            ready = needed.max(ready);
+            let input = ForceInput::new(self.state, self.reference, &window.block)
+                .in_ring(first, window.capacity);
             let (from, run) = (start * SLICE, (first + start * SLICE, end - start));
             total.add(&self.forces::<R>(input, run, from, &mut sums));
+        }
+        Ok(total)
+    }
+
+    /// Brings slices of a chunk, and behind it, into the window.
+    fn fill<R: Runner>(
+        &self,
+        chunk: &Chunk,
+        slices: Range<usize>,
+        window: &mut Window,
+        kept: &mut Kept,
+    ) -> Result<Evaluation, Breakdown> {
+        let (first, count) = chunk.range;
+        let within =
+            |from: usize, to: usize| slices.start.clamp(from, to)..slices.end.clamp(from, to);
+        let mut total = Evaluation::NONE;
+        let head = within(0, chunk.head.1);
+        window.write(head, TILE, |block, slices, at| {
+            block.copy_from(Some(chunk.head.0), slices, at);
+            Ok(())
+        })?;
+        window.write(within(chunk.head.1, count), TILE, |block, slices, at| {
+            total.add(&self.points_of_chunk::<R>(first, slices, kept, (block, at))?);
+            Ok(())
+        })?;
+        let last = count + chunk.behind();
+        if let Some((next, _)) = chunk.next {
+            window.write(within(count, last), TILE, |block, slices, at| {
+                let slices = slices.start - count..slices.end - count;
+                block.copy_from(Some(next), slices, at);
+                Ok(())
+            })?;
+        }
+        if slices.end == last && !slices.is_empty() {
+            window.write(last..last + 1, 1, |block, _, at| {
+                block.clear(at);
+                Ok(())
+            })?;
         }
         Ok(total)
     }
@@ -395,7 +483,7 @@ impl Passes<'_> {
         sums: &mut Array<3>,
     ) {
         let (input, speeds) = (
-            ForceInput::new(self.state, self.reference, block, 0),
+            ForceInput::new(self.state, self.reference, block),
             self.speeds,
         );
         ends.pairs(sums, |run, sums| {
@@ -443,8 +531,14 @@ impl Sweep {
         } else {
             Store::Chunks {
                 heads: (0..chunks).map(|_| block(reach)).collect(),
-                // One more for what lies behind the body.
-                windows: PerThread::new(|| block(each.min(layout.slices) + reach + 1)),
+                windows: PerThread::new(|| {
+                    // One more for what lies behind the body.
+                    let capacity = (TILE + reach + 1).next_power_of_two();
+                    Window {
+                        block: block(capacity + 1),
+                        capacity,
+                    }
+                }),
             }
         };
         Self {
@@ -495,7 +589,7 @@ impl Sweep {
                 {
                     passes.bound::<R, _>(pairs, block, ends, force);
                 }
-                let input = ForceInput::new(passes.state, passes.reference, block, 0);
+                let input = ForceInput::new(passes.state, passes.reference, block);
                 let forces = ends.pairs(force, |run, sums| passes.forces::<R>(input, run, 0, sums));
                 Evaluation::sum([points].into_iter().chain(forces).map(Ok))?
             }
@@ -503,24 +597,27 @@ impl Sweep {
                 let chunks = std::iter::zip(out.pieces(each), &mut *heads).collect();
                 let points = parallel::map_slabs(chunks, |chunk, (mut kept, head)| {
                     let (first, slices) = layout.piece_range(chunk, each);
-                    passes.points_of_chunk::<R>(first, 0..slices.min(reach), &mut kept, head)
+                    let starts = (0..slices.min(reach)).step_by(TILE);
+                    Evaluation::sum(starts.map(|start| {
+                        let tile = start..slices.min(reach).min(start + TILE);
+                        passes.points_of_chunk::<R>(first, tile, &mut kept, (&mut *head, start))
+                    }))
                 });
                 let points = Evaluation::sum(points)?;
                 let chunks = std::iter::zip(out.pieces(each), ends.chunks(force));
                 let heads = &*heads;
-                let reach_of = |chunk| layout.piece_range(chunk, each).1.min(reach);
-                let chunks = windows.map(chunks.collect(), |window, chunk, outputs| {
-                    let (first, slices) = layout.piece_range(chunk, each);
-                    let head = reach_of(chunk);
-                    window.copy_from(&heads[chunk], 0, head);
-                    let mut end = slices;
-                    if let Some(next) = heads.get(chunk + 1) {
-                        let head = reach_of(chunk + 1);
-                        window.copy_from(next, slices, head);
-                        end += head;
-                    }
-                    window.clear(end);
-                    passes.chunk::<R>((first, slices), (head, reach), window, outputs)
+                let head = |chunk: usize| {
+                    let (_, slices) = layout.piece_range(chunk, each);
+                    (&heads[chunk], slices.min(reach))
+                };
+                let chunks = windows.map(chunks.collect(), |window, index, outputs| {
+                    let chunk = Chunk {
+                        range: layout.piece_range(index, each),
+                        reach,
+                        head: head(index),
+                        next: (index + 1 < heads.len()).then(|| head(index + 1)),
+                    };
+                    passes.chunk::<R>(&chunk, window, outputs)
                 });
                 Evaluation::sum([Ok(points)].into_iter().chain(chunks))?
             }
@@ -534,7 +631,8 @@ impl Sweep {
         let blocks = match &self.store {
             Store::Whole(block) => block.bytes(),
             Store::Chunks { heads, windows } => {
-                heads.iter().map(Block::bytes).sum::<usize>() + windows.sum(Block::bytes)
+                heads.iter().map(Block::bytes).sum::<usize>()
+                    + windows.sum(|window| window.block.bytes())
             }
         };
         blocks + std::mem::size_of_val(&self.ends.behind[..])

@@ -376,7 +376,7 @@ impl Url {
                 self.sweep.whole(),
             ) {
                 (Some(conduction), Some(theta), Some(block)) => {
-                    let input = ForceInput::new(state, reference, block, 0);
+                    let input = ForceInput::new(state, reference, block);
                     let kinematics = Kinematics::new(state, reference);
                     (total.conduction, total.conduction_step) =
                         conduction.rates::<R>(&input, &kinematics, theta, heat);
@@ -400,7 +400,7 @@ impl Url {
             &mut self.rates.heat,
             self.sweep.whole(),
         ) {
-            let input = ForceInput::new(state, reference, block, 0);
+            let input = ForceInput::new(state, reference, block);
             let kinematics = Kinematics::new(state, reference);
             conduction.calibrate::<Vectors>(&input, &kinematics, heat);
         }
@@ -461,7 +461,7 @@ impl Url {
         let Some(block) = self.sweep.whole() else {
             return f64::INFINITY;
         };
-        let input = ForceInput::new(state, reference, block, 0);
+        let input = ForceInput::new(state, reference, block);
         let density = self.law.density();
         let slabs = vec![(); reference.layout.slabs()];
         let found = parallel::map_slabs(
@@ -497,7 +497,7 @@ impl Url {
                 }));
             });
         }
-        let input = ForceInput::new(state, reference, block, 0);
+        let input = ForceInput::new(state, reference, block);
         if options.linear
             && let Pairs::Closed(pairs) = reference.pair_vectors()
         {
@@ -920,7 +920,7 @@ mod tests {
             url.evaluate(&state, &reference, None)
                 .expect("a good state");
             let block = url.sweep.whole().expect("asked for");
-            let input = ForceInput::new(&state, &reference, block, 0);
+            let input = ForceInput::new(&state, &reference, block);
             let speeds = url.wave_speeds();
             let (mut error, mut largest) = (0.0_f64, 0.0_f64);
             for a in (0..reference.layout.particles).map(Layout::slot) {
