@@ -213,7 +213,7 @@ struct Ends {
 }
 
 impl Ends {
-    /// The sums in chunks, with those behind them, all zero.
+    /// The sums in chunks, with those behind them.
     fn chunks<'a>(&'a mut self, sums: &'a mut Array<3>) -> Vec<Sums<'a>> {
         let behind = self.behind.chunks_mut(3 * self.reach).map(|all| {
             let (x, rest) = all.split_at_mut(self.reach);
