@@ -104,8 +104,8 @@ impl Ladder {
             Geometry::Mesh(_) => {
                 return Err(Error::scene(
                     "geometry.mesh",
-                    "a mesh from a file cannot be refined, so that its error cannot be estimated: use a box, \
-                     boxes, a cylinder or a perforated_box, or run meshes of several sizes and compare them",
+                    "a mesh from a file cannot be refined, which presets and estimates of the error need: use a \
+                     box, boxes, a cylinder or a perforated_box, or run meshes of several sizes and compare them",
                 ));
             }
         };
