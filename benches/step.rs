@@ -2,38 +2,22 @@
 //!
 //! A column at the start of a twist: 17 x 97 x 17 particles, or 9 x 49 x 9. `cargo bench --bench step`.
 
+#[path = "column/mod.rs"]
+mod column;
+
 use std::hint::black_box;
 
 use criterion::measurement::WallTime;
 use criterion::{
     BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main,
 };
-use urlsph::{Scene, Simulation};
+use urlsph::Simulation;
 
-const SCENE: &str = include_str!("../examples/column_twisting/scene.json");
-
-/// Plasticity as soft as the column is: it flows from the first steps on.
-const VON_MISES: &str = r#"material={"von_mises": {
-    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
-    "yield_stress": 1e4, "hardening_modulus": 1e5
-}}"#;
-const JOHNSON_COOK: &str = r#"material={"johnson_cook": {
-    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
-    "yield_stress": 1e4, "hardening_modulus": 1e5, "hardening_exponent": 0.31,
-    "rate_coefficient": 0.025, "reference_strain_rate": 1,
-    "softening_exponent": 1.09, "melting_temperature": 1356, "transition_temperature": 290
-}}"#;
-const HEAT: &str = r#"heat={
-    "specific_heat": 383, "reference_temperature": 293, "conductivity": 10, "gruneisen_coefficient": 0.1
-}"#;
-
-const JITTER: &str = "geometry.box.jitter={\"fraction\": 0.2}";
+use column::{HEAT, JITTER, JOHNSON_COOK, VON_MISES};
 
 /// The twisted column after a few steps, at a spacing.
-fn column(spacing: f64, threads: usize, overrides: &[&str]) -> Simulation {
-    let mut all = vec![format!("geometry.box.spacing={spacing}")];
-    all.extend(overrides.iter().map(|o| (*o).to_string()));
-    let scene = Scene::from_json(SCENE, &all).expect("the example is a scene");
+fn twisted(spacing: f64, threads: usize, overrides: &[&str]) -> Simulation {
+    let scene = column::scene(spacing, overrides).expect("the example is a scene");
     let mut simulation = Simulation::with_threads(scene, threads).expect("it can be set up");
     let few = 5.0 * simulation.stable_step();
     simulation.advance(few).expect("it runs");
@@ -49,7 +33,7 @@ fn right_hand_side(c: &mut Criterion) {
         ("Johnson-Cook with heat", &[JOHNSON_COOK, HEAT]),
     ];
     for ((name, overrides), threads) in cases.iter().flat_map(|c| [(c, 1), (c, 2)]) {
-        let mut simulation = column(0.0625, threads, overrides);
+        let mut simulation = twisted(0.0625, threads, overrides);
         group.throughput(Throughput::Elements(simulation.pair_count() as u64));
         group.bench_function(BenchmarkId::new(*name, threads), |b| {
             b.iter(|| black_box(simulation.evaluate()));
@@ -135,7 +119,7 @@ fn options(c: &mut Criterion) {
         steps(
             &mut group,
             BenchmarkId::from_parameter(name),
-            column(0.125, 1, overrides),
+            twisted(0.125, 1, overrides),
         );
     }
     group.finish();
@@ -148,7 +132,7 @@ fn threads(c: &mut Criterion) {
         steps(
             &mut group,
             BenchmarkId::new("threads", threads),
-            column(0.0625, threads, &[]),
+            twisted(0.0625, threads, &[]),
         );
     }
     group.finish();

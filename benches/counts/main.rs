@@ -4,6 +4,8 @@
 
 #[path = "../../tests/cases/mod.rs"]
 mod cases;
+#[path = "../column/mod.rs"]
+mod column;
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod expected;

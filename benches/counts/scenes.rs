@@ -2,10 +2,7 @@
 
 use urlsph::Scene;
 
-const TWISTING: &str = include_str!("../../examples/column_twisting/scene.json");
-
-/// 7 x 37 x 7 particles: more would take longer under valgrind and count the same.
-const SPACING: &str = "geometry.box.spacing=0.16666666666666666";
+use crate::column::{self, HEAT, JITTER, JOHNSON_COOK, VON_MISES};
 
 /// The column as it is, elastic, and what the others are compared with.
 pub const ELASTIC: &str = "elastic";
@@ -20,9 +17,8 @@ pub struct Counted {
 
 impl Counted {
     pub fn read(&self) -> urlsph::Result<Scene> {
-        let mut all = vec![SPACING.to_owned()];
-        all.extend(self.overrides.iter().map(|o| (*o).to_owned()));
-        Scene::from_json(TWISTING, &all)
+        // 7 x 37 x 7 particles: more would take longer under valgrind and count the same.
+        column::scene(1.0 / 6.0, self.overrides)
     }
 }
 
@@ -42,21 +38,6 @@ const fn guarded(name: &'static str, overrides: &'static [&'static str]) -> Coun
     }
 }
 
-// As soft as the column is: the metals flow from the first steps on.
-const VON_MISES: &str = r#"material={"von_mises": {
-    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
-    "yield_stress": 1e4, "hardening_modulus": 1e5
-}}"#;
-const JOHNSON_COOK: &str = r#"material={"johnson_cook": {
-    "density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3,
-    "yield_stress": 1e4, "hardening_modulus": 1e5, "hardening_exponent": 0.31,
-    "rate_coefficient": 0.025, "reference_strain_rate": 1,
-    "softening_exponent": 1.09, "melting_temperature": 1356, "transition_temperature": 290
-}}"#;
-const HEAT: &str = r#"heat={
-    "specific_heat": 383, "reference_temperature": 293, "conductivity": 10, "gruneisen_coefficient": 0.1
-}"#;
-const JITTER: &str = r#"geometry.box.jitter={"fraction": 0.2}"#;
 /// More strain than the few steps that are counted reach.
 const STRAINED: &str = r#"numerics.reference_update={"when": {"strain": 0.2}}"#;
 const EVERY_STEP: &str = "numerics.reference_update=every_step";

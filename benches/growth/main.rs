@@ -1,13 +1,14 @@
 //! What a step costs from a thousand to a million particles: `README.md` beside this file.
 
+#[path = "../column/mod.rs"]
+mod column;
+
 use std::fmt::Write as _;
 
 use rustix::time::{ClockId, clock_gettime};
-use urlsph::{Scene, Simulation};
+use urlsph::Simulation;
 
-const SCENE: &str = include_str!("../../examples/column_twisting/scene.json");
-
-const JITTER: &str = "geometry.box.jitter={\"fraction\": 0.2}";
+use column::JITTER;
 
 /// Cells across the column.
 const SIZES: [u32; 7] = [5, 8, 11, 16, 25, 36, 55];
@@ -67,9 +68,8 @@ fn main() {
             if filter.as_ref().is_some_and(|f| !name.contains(f.as_str())) {
                 continue;
             }
-            let mut all = vec![format!("geometry.box.spacing={}", 1.0 / f64::from(cells))];
-            all.extend(overrides.iter().map(|o| (*o).to_string()));
-            let scene = Scene::from_json(SCENE, &all).expect("the example is a scene");
+            let scene = column::scene(1.0 / f64::from(cells), overrides);
+            let scene = scene.expect("the example is a scene");
             let start = cpu_seconds();
             let mut simulation = Simulation::with_threads(scene, 1).expect("it can be set up");
             let setup = cpu_seconds() - start;
