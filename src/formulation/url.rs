@@ -669,18 +669,20 @@ impl Url {
         let weights = reference.slices.weights();
         let (mut shortest, mut closest) = (f64::INFINITY, None);
         let (mut least, mut thinnest) = (f64::INFINITY, Layout::FIRST);
-        let stretches = parallel::fill(reference.layout.slices * SLICE, |i| {
-            stretch(Layout::slot(i))
-        });
+        let stretches = parallel::fill(reference.layout.particles, |i| stretch(Layout::slot(i)));
         for a in (0..reference.layout.particles).map(Layout::slot) {
             let own = stretches[a - Layout::FIRST];
             if own < least {
                 (least, thinnest) = (own, a);
             }
             for (b, pair) in reference.slices.of(a) {
+                if weights[pair] <= 0.0 {
+                    // No neighbour, and perhaps no particle.
+                    continue;
+                }
                 let dx = sub3(state.x.get(b), state.x.get(a));
                 let length = dot(dx, dx).sqrt() * 0.5 * (own + stretches[b - Layout::FIRST]);
-                if weights[pair] > 0.0 && length < shortest {
+                if length < shortest {
                     (shortest, closest) = (length, Some((a, b)));
                 }
             }

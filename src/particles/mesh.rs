@@ -227,13 +227,7 @@ impl Cell {
     fn jacobian(&self, at: &ShapeFunctions, positions: &[[f64; 3]]) -> Mat3<f64> {
         let mut j = [[0.0; 3]; 3];
         for (corner, node) in self.nodes().iter().enumerate() {
-            let (x, slope) = (positions[*node as usize], at.1[corner]);
-            // Without fused multiply-add: compiled for any processor, each one would be a call.
-            for r in 0..3 {
-                for c in 0..3 {
-                    j[r][c] += x[r] * slope[c];
-                }
-            }
+            j = add_outer(&j, positions[*node as usize], at.1[corner]);
         }
         j
     }
