@@ -95,14 +95,19 @@ fn main() {
                 });
                 step = seconds / steps as f64;
             }
-            let (rhs, pair) = (1e9 * rhs, 1e9 * step / (3 * pairs) as f64);
-            let particle = 1e6 * step / particles as f64;
+            let cell = |value: f64, digits: usize| match value.is_nan() {
+                true => String::new(),
+                false => format!("{value:.digits$}"),
+            };
+            let rhs = 1e9 * rhs;
+            let pair = cell(1e9 * step / (3 * pairs) as f64, 2);
+            let particle = cell(1e6 * step / particles as f64, 3);
             println!(
-                "| {body} | {particles} | {setup:.2} | {bytes} | {rhs:.2} | {pair:.2} | {particle:.3} |"
+                "| {body} | {particles} | {setup:.2} | {bytes} | {rhs:.2} | {pair} | {particle} |"
             );
             let _ = writeln!(
                 csv,
-                "{body},{particles},{pairs},{setup},{bytes},{rhs},{pair},{particle}"
+                "{body},{particles},{pairs},{setup},{bytes},{rhs:.2},{pair},{particle}"
             );
         }
     }

@@ -25,7 +25,7 @@ def main(table, picture):
     ]
     for ax, (column, label) in zip(axes, panels):
         for body, marker in zip(bodies, "os^D"):
-            own = [row for row in rows if row["body"] == body]
+            own = [row for row in rows if row["body"] == body and row[column]]
             ax.plot(
                 [float(row["particles"]) for row in own],
                 [float(row[column]) for row in own],
