@@ -172,10 +172,10 @@ impl<const N: usize> Array<N> {
             bytemuck::must_cast_slice_mut(&mut component[1 + slices.start..1 + slices.end])
         })
     }
-    /// Repeats some slices from slice `at` on.
-    pub fn repeat(&mut self, slices: Range<usize>, at: usize) {
+    /// Repeats the first slice that holds particles as slice `at`.
+    pub fn repeat_first(&mut self, at: usize) {
         for component in self.data.chunks_exact_mut(self.layout.stride()) {
-            component.copy_within(1 + slices.start..1 + slices.end, 1 + at);
+            component[1 + at] = component[1];
         }
     }
     /// Sets every slot, guards included.

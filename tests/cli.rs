@@ -463,19 +463,10 @@ fn a_diverged_run_leaves_its_last_good_state_and_advice() {
     assert!(rows.iter().flatten().all(|value| value.is_finite()));
 }
 
-#[cfg(unix)]
-#[test]
-fn an_interrupted_run_has_status_130_and_whole_files() {
-    let bench = Bench::new();
-    let mut child = bench
-        .command(&["run", "scene.json", "--out", "r", "--until", "1000"])
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // The handler is installed before the first row is written.
+/// Ends a run as Ctrl-C does, once it has got going.
+fn interrupt(mut child: std::process::Child, going: impl Fn() -> bool) {
     let patience = Instant::now() + Duration::from_secs(60);
-    while fs::read_to_string(bench.path("r/history.csv")).map_or(0, |text| text.lines().count()) < 3
-    {
+    while !going() {
         assert!(Instant::now() < patience, "the run does not get going");
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -485,6 +476,20 @@ fn an_interrupted_run_has_status_130_and_whole_files() {
         .unwrap();
     assert!(killed.success());
     assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_has_status_130_and_whole_files() {
+    let bench = Bench::new();
+    let child = bench
+        .command(&["run", "scene.json", "--out", "r", "--until", "1000"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The handler is installed before the first row is written.
+    let rows = || fs::read_to_string(bench.path("r/history.csv")).map_or(0, |t| t.lines().count());
+    interrupt(child, || rows() >= 3);
     let (header, rows) = history(&bench.path("r/history.csv"));
     assert!(rows.iter().all(|row| row.len() == header.len()));
     assert!(bench.path("r/last_good_state.vtu").exists());
@@ -598,22 +603,12 @@ fn accuracy_that_cannot_be_had_is_refused_with_the_reason_and_the_remedy() {
 #[test]
 fn an_interrupted_pilot_has_status_130_and_leaves_no_results() {
     let bench = Bench::new();
-    let mut child = bench
+    let child = bench
         .command(&[&FOR_ACCURACY[..], &["4%", "--until=1000"]].concat())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     // The handler is installed before the folder is made.
-    let patience = Instant::now() + Duration::from_secs(60);
-    while !bench.path("r").exists() {
-        assert!(Instant::now() < patience, "the pilots do not get going");
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    let killed = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(killed.success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    interrupt(child, || bench.path("r").exists());
     assert_eq!(fs::read_dir(bench.path("r")).unwrap().count(), 0);
 }

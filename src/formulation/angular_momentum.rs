@@ -60,17 +60,11 @@ pub fn project(
         })
     });
     let [xx, yy, zz, xy, xz, yz, torque @ ..] = total::<9>(&sums);
-    let inertia = nalgebra::Matrix3::new(
-        yy + zz,
-        -xy,
-        -xz, //
-        -xy,
-        xx + zz,
-        -yz, //
-        -xz,
-        -yz,
-        xx + yy,
-    );
+    let inertia = nalgebra::Matrix3::from([
+        [yy + zz, -xy, -xz],
+        [-xy, xx + zz, -yz],
+        [-xz, -yz, xx + yy],
+    ]);
     let torque = nalgebra::Vector3::from(torque);
     // A body of three dimensions has a regular inertia.
     let angular: [f64; 3] = inertia.lu().solve(&-torque).map_or([0.0; 3], Into::into);
@@ -166,15 +160,8 @@ impl Work for Spins<'_> {
             let y = sub3(self.body.arm(token, a), centre);
             let my = scale3(self.body.mass(token, a), y);
             let [tx, ty, tz] = cross(y, load3(token, &self.force, a));
-            let second = [
-                my[0] * y[0],
-                my[1] * y[1],
-                my[2] * y[2],
-                my[0] * y[1],
-                my[0] * y[2],
-                my[1] * y[2],
-            ];
-            let [xx, yy, zz, xy, xz, yz] = second;
+            let [xx, yy, zz] = [my[0] * y[0], my[1] * y[1], my[2] * y[2]];
+            let [xy, xz, yz] = [my[0] * y[1], my[0] * y[2], my[1] * y[2]];
             add_all(&mut sums, at, [xx, yy, zz, xy, xz, yz, tx, ty, tz]);
         }
         sums_of(&sums)

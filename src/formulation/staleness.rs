@@ -1,7 +1,8 @@
 //! When the reference configuration no longer serves: the strain since its last update.
 
+use super::passes::lanes_from;
 use crate::formulation::url::State;
-use crate::lane::{Lane, SLICE, Work, vectorised};
+use crate::lane::{Lane, Work, vectorised};
 use crate::math::*;
 use crate::parallel;
 use crate::reference::load9;
@@ -16,12 +17,8 @@ pub fn is_strained(state: &State, bound: f64) -> bool {
     let f = state.f.components();
     let slabs = (0..layout.slabs()).collect();
     let strained = parallel::map_slabs(slabs, |_, slab| {
-        let (first, slices) = layout.slab_range(slab);
-        vectorised(Strained {
-            f,
-            bound,
-            slots: (first, slices * SLICE),
-        })
+        let run = layout.slab_range(slab);
+        vectorised(Strained { f, bound, run })
     });
     strained.contains(&true)
 }
@@ -30,19 +27,17 @@ pub fn is_strained(state: &State, bound: f64) -> bool {
 struct Strained<'a> {
     f: [&'a [f64]; 9],
     bound: f64,
-    /// First slot and number of slots.
-    slots: (usize, usize),
+    run: (usize, usize),
 }
 
 impl Work for Strained<'_> {
     type Output = bool;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> bool {
-        let (first, count) = self.slots;
         // |f^T f - I|^2 = 4 |E|^2.
         let bound = T::splat(token, 4.0 * self.bound * self.bound);
         let minus = T::splat(token, -1.0);
-        (first..first + count).step_by(T::WIDTH).any(|a| {
+        lanes_from::<T>(self.run).any(|(_, a)| {
             let f = load9::<T>(token, &self.f, a);
             let change = axpy9(&mat_mul(&transpose(&f), &f), minus, &identity(token));
             (double_dot(&change, &change) - bound).any_positive()

@@ -1,6 +1,6 @@
 //! Updated Reference Lagrangian SPH, isothermal ([URL22] section 4.3).
 //!
-//! One evaluation has three passes over the body, each in slabs, or in longer pieces (3):
+//! One evaluation has three passes, in the order of [`super::sweep`]:
 //! 1. gradient: grad_chi v from the neighbours' velocities (54);
 //! 2. point: stress and everything else that belongs to one particle;
 //! 3. force: T_a (57) from the neighbours' stresses and the Riemann dissipation (59), each pair once for both

@@ -9,8 +9,8 @@ use crate::error::Result;
 
 /// Speed for accuracy in one word: how large the cells are beside those that the scene gives.
 ///
-/// Resolution is what accuracy costs. Of all settings it alone moves the error in every case of the bench by more than it
-/// moves the cost; the others are chosen by what a scene holds (shocks, metals, irregular particles).
+/// Resolution is what accuracy costs: of all settings it alone lowers the error in every case of the bench. The others are
+/// chosen by what a scene holds (shocks, metals, irregular particles).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
