@@ -3,18 +3,153 @@
 //!
 //! The instruction set is chosen at run time ([`vectorised`]); every operation here is exactly
 //! rounded, fused multiply-adds included, so the choice does not change a result.
+//!
+//! Sums over pairs ([`PairWork`]) need arithmetic alone and may run on twice as many lanes of half the
+//! precision (`f32`, [`Long`]); what belongs to one particle ([`Work`]) is in double precision always. Lanes
+//! of either precision read and write arrays of both.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
 
-/// Slots in a slice: a multiple of every vector width.
+/// Slots in a slice of numbers in double precision: a multiple of every vector width.
 pub const SLICE: usize = 8;
+/// The same of numbers in single precision; whole slices of the other ones, too.
+pub const LONG_SLICE: usize = 16;
 
 /// Storage of one component of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 pub struct Slots(pub [f64; SLICE]);
+
+/// The same in single precision.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
+pub struct LongSlots(pub [f32; LONG_SLICE]);
+
+/// A number that arrays hold and that lanes calculate with.
+pub trait Real: bytemuck::Pod + Send + Sync + PartialEq + std::fmt::Debug {
+    /// Slots in a slice.
+    const SLICE: usize;
+    /// Storage of one component of a slice.
+    type Slots: bytemuck::Pod + Send + Sync + PartialEq + std::fmt::Debug;
+    /// A slice of the number nearest to a value.
+    fn slots(value: f64) -> Self::Slots;
+    /// The number nearest to a value.
+    fn nearest(value: f64) -> Self;
+    /// Its value.
+    fn value(self) -> f64;
+    /// Reads a vector of double precision.
+    fn load_wide<S: Simd>(simd: S, from: &[Self]) -> S::f64s;
+    /// Reads a vector of single precision.
+    fn load_long<S: Simd>(simd: S, from: &[Self]) -> S::f32s;
+    /// Writes a vector of double precision.
+    fn store_wide<S: Simd>(value: S::f64s, to: &mut [Self]);
+    /// Writes a vector of single precision.
+    fn store_long<S: Simd>(value: S::f32s, to: &mut [Self]);
+    /// Runs `work` on the widest vectors of such numbers that this processor has.
+    fn vectorised<W: PairWork>(work: W) -> W::Output;
+    /// Runs `work` on one particle at a time.
+    #[cfg(test)]
+    fn one_by_one<W: PairWork>(work: W) -> W::Output;
+    /// Runs `work` on the AVX2 instructions; `None` where the processor has none.
+    #[cfg(all(test, target_arch = "x86_64"))]
+    fn on_avx2<W: PairWork>(work: W) -> Option<W::Output>;
+}
+
+impl Real for f64 {
+    const SLICE: usize = SLICE;
+    type Slots = Slots;
+    fn slots(value: f64) -> Slots {
+        Slots([value; SLICE])
+    }
+    #[inline(always)]
+    fn nearest(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn value(self) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn load_wide<S: Simd>(_: S, from: &[Self]) -> S::f64s {
+        S::as_simd_f64s(from).0[0]
+    }
+    #[inline(always)]
+    fn load_long<S: Simd>(simd: S, from: &[Self]) -> S::f32s {
+        let mut value = simd.splat_f32s(0.0);
+        let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut value));
+        lanes.iter_mut().zip(from).for_each(|(l, v)| *l = *v as f32);
+        value
+    }
+    #[inline(always)]
+    fn store_wide<S: Simd>(value: S::f64s, to: &mut [Self]) {
+        S::as_mut_simd_f64s(to).0[0] = value;
+    }
+    #[inline(always)]
+    fn store_long<S: Simd>(value: S::f32s, to: &mut [Self]) {
+        let lanes: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
+        to.iter_mut().zip(lanes).for_each(|(t, l)| *t = f64::from(*l));
+    }
+    fn vectorised<W: PairWork>(work: W) -> W::Output {
+        dispatch(OnDoubles(work))
+    }
+    #[cfg(test)]
+    fn one_by_one<W: PairWork>(work: W) -> W::Output {
+        work.run::<f64>(())
+    }
+    #[cfg(all(test, target_arch = "x86_64"))]
+    fn on_avx2<W: PairWork>(work: W) -> Option<W::Output> {
+        narrow(OnDoubles(work))
+    }
+}
+
+impl Real for f32 {
+    const SLICE: usize = LONG_SLICE;
+    type Slots = LongSlots;
+    fn slots(value: f64) -> LongSlots {
+        LongSlots([value as f32; LONG_SLICE])
+    }
+    #[inline(always)]
+    fn nearest(value: f64) -> Self {
+        value as f32
+    }
+    #[inline(always)]
+    fn value(self) -> f64 {
+        f64::from(self)
+    }
+    #[inline(always)]
+    fn load_wide<S: Simd>(simd: S, from: &[Self]) -> S::f64s {
+        let mut value = simd.splat_f64s(0.0);
+        let lanes: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut value));
+        lanes.iter_mut().zip(from).for_each(|(l, v)| *l = f64::from(*v));
+        value
+    }
+    #[inline(always)]
+    fn load_long<S: Simd>(_: S, from: &[Self]) -> S::f32s {
+        S::as_simd_f32s(from).0[0]
+    }
+    #[inline(always)]
+    fn store_wide<S: Simd>(value: S::f64s, to: &mut [Self]) {
+        let lanes: &[f64] = bytemuck::cast_slice(std::slice::from_ref(&value));
+        to.iter_mut().zip(lanes).for_each(|(t, l)| *t = *l as f32);
+    }
+    #[inline(always)]
+    fn store_long<S: Simd>(value: S::f32s, to: &mut [Self]) {
+        S::as_mut_simd_f32s(to).0[0] = value;
+    }
+    fn vectorised<W: PairWork>(work: W) -> W::Output {
+        dispatch(OnSingles(work))
+    }
+    #[cfg(test)]
+    fn one_by_one<W: PairWork>(work: W) -> W::Output {
+        work.run::<f32>(())
+    }
+    #[cfg(all(test, target_arch = "x86_64"))]
+    fn on_avx2<W: PairWork>(work: W) -> Option<W::Output> {
+        narrow(OnSingles(work))
+    }
+}
 
 /// One value, or one value per slot of (a part of) a slice.
 pub trait Lane:
@@ -27,8 +162,12 @@ pub trait Lane:
 {
     /// Proof that the processor has the instructions; needed to make a value.
     type Token: Copy + Send + Sync;
+    /// Precision.
+    type Real: Real;
     /// Particles per value.
     const WIDTH: usize;
+    /// What makes a denominator positive and is nothing beside any other.
+    const TINY: f64;
     /// The proof that came with this value.
     fn token(self) -> Self::Token;
     /// The same in every lane.
@@ -44,22 +183,26 @@ pub trait Lane:
     /// `yes` where `self > 0`, else `no`.
     fn if_positive(self, yes: Self, no: Self) -> Self;
     /// Reads from `from[at..]`.
-    fn load(token: Self::Token, from: &[f64], at: usize) -> Self;
+    fn load<E: Real>(token: Self::Token, from: &[E], at: usize) -> Self;
     /// Writes to `to[at..]`.
-    fn store(self, to: &mut [f64], at: usize);
+    fn store<E: Real>(self, to: &mut [E], at: usize);
     /// Calls `each(lane, value)` in the order of the lanes.
     fn for_lanes(self, each: impl FnMut(usize, f64));
     /// Whether `self > 0` in any lane: to leave out work that no lane needs, never to choose how a
     /// lane's own value comes about.
     fn any_positive(self) -> bool;
-    /// The values whose bit patterns are `each(bits)`.
-    fn map_bits(self, each: impl Fn(u64) -> u64) -> Self;
 
     /// The same in every lane, in the company of this value.
     #[inline(always)]
     fn of(self, value: f64) -> Self {
         Self::splat(self.token(), value)
     }
+}
+
+/// Lanes of double precision, for which there are more functions than arithmetic alone.
+pub trait Precise: Lane<Real = f64> {
+    /// The values whose bit patterns are `each(bits)`.
+    fn map_bits(self, each: impl Fn(u64) -> u64) -> Self;
 
     /// `self^(-1/3)` for positive values: Newton's iteration for y^-3 = x.
     #[inline(always)]
@@ -199,67 +342,89 @@ fn inverse_cbrt_guess(bits: u64) -> u64 {
     0x553E_F0FF_u64.wrapping_sub(third) << 32
 }
 
-impl Lane for f64 {
-    type Token = ();
-    const WIDTH: usize = 1;
-    #[inline(always)]
-    fn token(self) {}
-    #[inline(always)]
-    fn splat((): (), value: f64) -> Self {
-        value
-    }
-    #[inline(always)]
-    fn mul_add(self, a: Self, b: Self) -> Self {
-        f64::mul_add(self, a, b)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        if self < other { self } else { other }
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        if self > other { self } else { other }
-    }
-    #[inline(always)]
-    fn if_positive(self, yes: Self, no: Self) -> Self {
-        if self > 0.0 { yes } else { no }
-    }
-    #[inline(always)]
-    fn load((): (), from: &[f64], at: usize) -> Self {
-        from[at]
-    }
-    #[inline(always)]
-    fn store(self, to: &mut [f64], at: usize) {
-        to[at] = self;
-    }
-    #[inline(always)]
-    fn for_lanes(self, mut each: impl FnMut(usize, f64)) {
-        each(0, self);
-    }
-    #[inline(always)]
-    fn any_positive(self) -> bool {
-        self > 0.0
-    }
+macro_rules! one_lane {
+    ($real:ident, $tiny:expr) => {
+        impl Lane for $real {
+            type Token = ();
+            type Real = $real;
+            const WIDTH: usize = 1;
+            const TINY: f64 = $tiny;
+            #[inline(always)]
+            fn token(self) {}
+            #[inline(always)]
+            fn splat((): (), value: f64) -> Self {
+                Self::nearest(value)
+            }
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                $real::mul_add(self, a, b)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $real::sqrt(self)
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                if self < other { self } else { other }
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if self > other { self } else { other }
+            }
+            #[inline(always)]
+            fn if_positive(self, yes: Self, no: Self) -> Self {
+                if self > 0.0 { yes } else { no }
+            }
+            #[inline(always)]
+            fn load<E: Real>((): (), from: &[E], at: usize) -> Self {
+                Self::nearest(from[at].value())
+            }
+            #[inline(always)]
+            fn store<E: Real>(self, to: &mut [E], at: usize) {
+                to[at] = E::nearest(self.value());
+            }
+            #[inline(always)]
+            fn for_lanes(self, mut each: impl FnMut(usize, f64)) {
+                each(0, self.value());
+            }
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                self > 0.0
+            }
+        }
+    };
+}
+one_lane!(f64, f64::MIN_POSITIVE);
+one_lane!(f32, LONG_TINY);
+
+/// Far above the smallest number, because such a denominator's inverse is still to be one, and far below what the
+/// lengths and speeds of any scene that is allowed single precision make.
+const LONG_TINY: f64 = 1e-36;
+
+impl Precise for f64 {
     #[inline(always)]
     fn map_bits(self, each: impl Fn(u64) -> u64) -> Self {
         f64::from_bits(each(self.to_bits()))
     }
 }
 
-/// A vector register.
+/// A vector register of double precision.
 #[derive(Clone, Copy)]
 pub struct Wide<S: Simd> {
     simd: S,
     value: S::f64s,
 }
 
+/// A vector register of single precision.
+#[derive(Clone, Copy)]
+pub struct Long<S: Simd> {
+    simd: S,
+    value: S::f32s,
+}
+
 macro_rules! operator {
-    ($trait:ident $method:ident $call:ident) => {
-        impl<S: Simd> $trait for Wide<S> {
+    ($vector:ident, $trait:ident, $method:ident, $call:ident) => {
+        impl<S: Simd> $trait for $vector<S> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -271,101 +436,121 @@ macro_rules! operator {
         }
     };
 }
-operator!(Add add add_f64s);
-operator!(Sub sub sub_f64s);
-operator!(Mul mul mul_f64s);
-operator!(Div div div_f64s);
 
-impl<S: Simd> Neg for Wide<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self {
-            value: self.simd.neg_f64s(self.value),
-            ..self
+/// The operations of a vector register, by the names of its instructions.
+macro_rules! vector {
+    ($vector:ident, $real:ident, $lanes:ident, $tiny:expr, $load:ident, $store:ident, $splat:ident,
+     $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $mul_add:ident, $sqrt:ident,
+     $greater:ident, $select:ident, $first:ident) => {
+        operator!($vector, Add, add, $add);
+        operator!($vector, Sub, sub, $sub);
+        operator!($vector, Mul, mul, $mul);
+        operator!($vector, Div, div, $div);
+
+        impl<S: Simd> Neg for $vector<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self {
+                    value: self.simd.$neg(self.value),
+                    ..self
+                }
+            }
         }
-    }
+
+        impl<S: Simd> $vector<S> {
+            /// `self` where `self > other`, else `other`: the order of the operands decides for NaN, alike
+            /// on every instruction set.
+            #[inline(always)]
+            fn select_greater(self, other: Self, yes: Self, no: Self) -> Self {
+                let mask = self.simd.$greater(self.value, other.value);
+                Self {
+                    value: self.simd.$select(mask, yes.value, no.value),
+                    ..self
+                }
+            }
+        }
+
+        impl<S: Simd> Lane for $vector<S> {
+            type Token = S;
+            type Real = $real;
+            const WIDTH: usize = S::$lanes;
+            const TINY: f64 = $tiny;
+            #[inline(always)]
+            fn token(self) -> S {
+                self.simd
+            }
+            #[inline(always)]
+            fn splat(simd: S, value: f64) -> Self {
+                Self {
+                    simd,
+                    value: simd.$splat($real::nearest(value)),
+                }
+            }
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                Self {
+                    value: self.simd.$mul_add(self.value, a.value, b.value),
+                    ..self
+                }
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self {
+                    value: self.simd.$sqrt(self.value),
+                    ..self
+                }
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                other.select_greater(self, self, other)
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.select_greater(other, self, other)
+            }
+            #[inline(always)]
+            fn if_positive(self, yes: Self, no: Self) -> Self {
+                self.select_greater(self.of(0.0), yes, no)
+            }
+            #[inline(always)]
+            fn load<E: Real>(simd: S, from: &[E], at: usize) -> Self {
+                Self {
+                    simd,
+                    value: E::$load(simd, &from[at..at + Self::WIDTH]),
+                }
+            }
+            #[inline(always)]
+            fn store<E: Real>(self, to: &mut [E], at: usize) {
+                E::$store::<S>(self.value, &mut to[at..at + Self::WIDTH]);
+            }
+            #[inline(always)]
+            fn for_lanes(self, mut each: impl FnMut(usize, f64)) {
+                let values: &[$real] = bytemuck::cast_slice(std::slice::from_ref(&self.value));
+                for (lane, value) in values.iter().enumerate() {
+                    each(lane, value.value());
+                }
+            }
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                let zero = self.of(0.0);
+                let mask = self.simd.$greater(self.value, zero.value);
+                self.simd.$first(mask) < Self::WIDTH
+            }
+        }
+    };
 }
+vector!(
+    Wide, f64, F64_LANES, f64::MIN_POSITIVE, load_wide, store_wide, splat_f64s, add_f64s, sub_f64s,
+    mul_f64s, div_f64s, neg_f64s, mul_add_f64s, sqrt_f64s, greater_than_f64s, select_f64s,
+    first_true_m64s
+);
+vector!(
+    Long, f32, F32_LANES, LONG_TINY, load_long, store_long, splat_f32s, add_f32s, sub_f32s, mul_f32s,
+    div_f32s, neg_f32s, mul_add_f32s, sqrt_f32s, greater_than_f32s, select_f32s, first_true_m32s
+);
 
-impl<S: Simd> Wide<S> {
-    /// `self` where `self > other`, else `other`: the order of the operands decides for NaN, alike
-    /// on every instruction set.
-    #[inline(always)]
-    fn select_greater(self, other: Self, yes: Self, no: Self) -> Self {
-        let mask = self.simd.greater_than_f64s(self.value, other.value);
-        Self {
-            value: self.simd.select_f64s(mask, yes.value, no.value),
-            ..self
-        }
-    }
-}
-
-impl<S: Simd> Lane for Wide<S> {
-    type Token = S;
-    const WIDTH: usize = S::F64_LANES;
-    #[inline(always)]
-    fn token(self) -> S {
-        self.simd
-    }
-    #[inline(always)]
-    fn splat(simd: S, value: f64) -> Self {
-        Self {
-            simd,
-            value: simd.splat_f64s(value),
-        }
-    }
-    #[inline(always)]
-    fn mul_add(self, a: Self, b: Self) -> Self {
-        Self {
-            value: self.simd.mul_add_f64s(self.value, a.value, b.value),
-            ..self
-        }
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self {
-            value: self.simd.sqrt_f64s(self.value),
-            ..self
-        }
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        other.select_greater(self, self, other)
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.select_greater(other, self, other)
-    }
-    #[inline(always)]
-    fn if_positive(self, yes: Self, no: Self) -> Self {
-        self.select_greater(self.of(0.0), yes, no)
-    }
-    #[inline(always)]
-    fn load(simd: S, from: &[f64], at: usize) -> Self {
-        let (whole, _) = S::as_simd_f64s(&from[at..at + Self::WIDTH]);
-        Self {
-            simd,
-            value: whole[0],
-        }
-    }
-    #[inline(always)]
-    fn store(self, to: &mut [f64], at: usize) {
-        let (whole, _) = S::as_mut_simd_f64s(&mut to[at..at + Self::WIDTH]);
-        whole[0] = self.value;
-    }
-    #[inline(always)]
-    fn for_lanes(self, mut each: impl FnMut(usize, f64)) {
-        let values: &[f64] = bytemuck::cast_slice(std::slice::from_ref(&self.value));
-        for (lane, value) in values.iter().enumerate() {
-            each(lane, *value);
-        }
-    }
-    #[inline(always)]
-    fn any_positive(self) -> bool {
-        let zero = self.simd.splat_f64s(0.0);
-        let mask = self.simd.greater_than_f64s(self.value, zero);
-        self.simd.first_true_m64s(mask) < Self::WIDTH
-    }
+impl<S: Simd> Precise for Wide<S> {
     #[inline(always)]
     fn map_bits(self, each: impl Fn(u64) -> u64) -> Self {
         let mut mapped = self;
@@ -380,24 +565,38 @@ impl<S: Simd> Lane for Wide<S> {
 /// A running sum or minimum by the place in a slice, so that its order, and with it the bits, do not
 /// depend on the width of the vectors.
 #[derive(Clone, Copy)]
-pub struct PerSlot([f64; SLICE]);
+pub struct PerSlot([f64; LONG_SLICE]);
 
 impl PerSlot {
     /// Starts everywhere with `value`.
     pub fn new(value: f64) -> Self {
-        Self([value; SLICE])
+        Self([value; LONG_SLICE])
     }
     /// Adds the value for the slots from `at`.
     #[inline(always)]
     pub fn add<T: Lane>(&mut self, at: usize, value: T) {
-        let sum = T::load(value.token(), &self.0, at % SLICE) + value;
-        sum.store(&mut self.0, at % SLICE);
+        self.update(at, value, |sum, value| sum + value, |sum, value| sum + value);
     }
     /// Takes the minimum with the value for the slots from `at`; a value that is NaN is ignored.
     #[inline(always)]
     pub fn min<T: Lane>(&mut self, at: usize, value: T) {
-        let least = value.min(T::load(value.token(), &self.0, at % SLICE));
-        least.store(&mut self.0, at % SLICE);
+        self.update(at, value, |least, value| value.min(least), |least, value| value.min(least));
+    }
+    /// On lanes where they are of double precision, as the sums are.
+    #[inline(always)]
+    fn update<T: Lane>(
+        &mut self,
+        at: usize,
+        value: T,
+        lanes: impl Fn(T, T) -> T,
+        one: impl Fn(f64, f64) -> f64,
+    ) {
+        let at = at % T::Real::SLICE;
+        if T::Real::SLICE == SLICE {
+            lanes(T::load(value.token(), &self.0, at), value).store(&mut self.0, at);
+        } else {
+            value.for_lanes(|lane, value| self.0[at + lane] = one(self.0[at + lane], value));
+        }
     }
     /// Sum over the slice.
     pub fn sum(&self) -> f64 {
@@ -409,43 +608,81 @@ impl PerSlot {
     }
 }
 
-/// Work on the slices of a slab, written once over lanes.
+/// Work on a run of slots, written once over lanes of double precision.
 pub trait Work {
     /// What it returns.
     type Output;
     /// Does the work. Implementations and all they call are `#[inline(always)]`, closures included,
     /// down to the operations of [`Lane`]: only then do they get the caller's instruction set.
+    fn run<T: Precise>(self, token: T::Token) -> Self::Output;
+}
+
+/// The same over lanes of either precision.
+pub trait PairWork {
+    /// What it returns.
+    type Output;
+    /// Does the work: see [`Work::run`].
     fn run<T: Lane>(self, token: T::Token) -> Self::Output;
 }
 
-#[cfg(not(target_arch = "x86_64"))]
-struct Dispatch<W>(W);
-
-#[cfg(not(target_arch = "x86_64"))]
-impl<W: Work> pulp::WithSimd for Dispatch<W> {
-    type Output = W::Output;
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> W::Output {
-        self.0.run::<Wide<S>>(simd)
-    }
+/// Work with the kind of its lanes settled, but not yet their width.
+trait Settled {
+    type Output;
+    fn on_one(self) -> Self::Output;
+    fn on<S: Simd>(self, simd: S) -> Self::Output;
 }
 
+struct Precisely<W>(W);
+struct OnDoubles<W>(W);
+struct OnSingles<W>(W);
+
+macro_rules! settled {
+    ($kind:ident, $work:ident, $one:ident, $vector:ident) => {
+        impl<W: $work> Settled for $kind<W> {
+            type Output = W::Output;
+            #[inline(always)]
+            fn on_one(self) -> W::Output {
+                self.0.run::<$one>(())
+            }
+            #[inline(always)]
+            fn on<S: Simd>(self, simd: S) -> W::Output {
+                self.0.run::<$vector<S>>(simd)
+            }
+        }
+    };
+}
+settled!(Precisely, Work, f64, Wide);
+settled!(OnDoubles, PairWork, f64, Wide);
+settled!(OnSingles, PairWork, f32, Long);
+
 /// Runs `work` on the widest vectors that this processor has.
-#[cfg(not(target_arch = "x86_64"))]
 pub fn vectorised<W: Work>(work: W) -> W::Output {
+    dispatch(Precisely(work))
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn dispatch<W: Settled>(work: W) -> W::Output {
+    struct Dispatch<W>(W);
+    impl<W: Settled> pulp::WithSimd for Dispatch<W> {
+        type Output = W::Output;
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> W::Output {
+            self.0.on(simd)
+        }
+    }
     pulp::Arch::new().dispatch(Dispatch(work))
 }
 
-/// Runs `work` on the widest vectors that this processor has. One without AVX2 gets one particle at a
-/// time: vectors emulated on single numbers would be most of the library's code.
+/// A processor without AVX2 gets one particle at a time: vectors emulated on single numbers would be most of
+/// the library's code.
 #[cfg(target_arch = "x86_64")]
-pub fn vectorised<W: Work>(work: W) -> W::Output {
+fn dispatch<W: Settled>(work: W) -> W::Output {
     if let Some(avx512) = pulp::x86::V4::try_new() {
         avx512.vectorize(Inside(work, avx512))
     } else if let Some(avx2) = pulp::x86::V3::try_new() {
         avx2.vectorize(Inside(work, avx2))
     } else {
-        work.run::<f64>(())
+        work.on_one()
     }
 }
 
@@ -454,17 +691,22 @@ pub fn vectorised<W: Work>(work: W) -> W::Output {
 struct Inside<W, S>(W, S);
 
 #[cfg(target_arch = "x86_64")]
-impl<W: Work, S: Simd> pulp::NullaryFnOnce for Inside<W, S> {
+impl<W: Settled, S: Simd> pulp::NullaryFnOnce for Inside<W, S> {
     type Output = W::Output;
     #[inline(always)]
     fn call(self) -> W::Output {
-        self.0.run::<Wide<S>>(self.1)
+        self.0.on(self.1)
     }
 }
 
 /// Runs `work` on the AVX2 instructions, for the tests; `None` where the processor has none.
 #[cfg(all(test, target_arch = "x86_64"))]
 pub fn on_avx2<W: Work>(work: W) -> Option<W::Output> {
+    narrow(Precisely(work))
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+fn narrow<W: Settled>(work: W) -> Option<W::Output> {
     let avx2 = pulp::x86::V3::try_new()?;
     Some(avx2.vectorize(Inside(work, avx2)))
 }
@@ -484,7 +726,7 @@ mod tests {
     impl Work for Apply<'_> {
         type Output = ();
         #[inline(always)]
-        fn run<T: Lane>(self, token: T::Token) {
+        fn run<T: Precise>(self, token: T::Token) {
             for at in (0..self.1.len()).step_by(T::WIDTH) {
                 let x = T::load(token, self.1, at);
                 let y = match self.0 {

@@ -1,21 +1,21 @@
 //! Structure-of-arrays storage of per-particle fields.
 //!
-//! A component is contiguous; particles sit in slots, eight to a slice. One guard slice before and
-//! one after the particles, and the unused lanes of the last slice, hold finite dummies, so that a
-//! slice can be read at any offset and a pair weight of 0 makes the dummies harmless.
+//! A component is contiguous; particles sit in slots, and slots in slices: 8 numbers in double precision or 16 in
+//! single precision. Guard slots before and after the particles, and the unused lanes of the last slice, hold
+//! finite dummies, so that a slice can be read at any offset and a pair weight of 0 makes the dummies harmless.
 
 use std::ops::Range;
 
-use crate::lane::{SLICE, Slots};
+use crate::lane::{LONG_SLICE, Real, SLICE};
 
 /// Shape shared by all arrays of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Particles.
     pub particles: usize,
-    /// Slices that hold them.
-    pub slices: usize,
-    /// Slices per slab: the unit of parallel work and of partial sums.
+    /// Slots that hold them: whole slices of any precision.
+    pub slots: usize,
+    /// Slots per slab, the unit of parallel work and of partial sums: whole slices, too.
     pub slab: usize,
 }
 
@@ -23,36 +23,40 @@ impl Layout {
     /// Layout for a number of particles. The slab is a function of that number alone: small enough
     /// to feed many threads, large enough to make its bookkeeping negligible.
     pub fn new(particles: usize) -> Self {
-        let slices = particles.div_ceil(SLICE).max(1);
+        let slices = particles.div_ceil(SLICE);
         Self {
             particles,
-            slices,
-            slab: (slices / 256).clamp(8, 256),
+            slots: particles.max(1).next_multiple_of(LONG_SLICE),
+            slab: ((slices / 256).clamp(8, 256) * SLICE).next_multiple_of(LONG_SLICE),
         }
     }
-    /// First slot: the guard slice comes before.
-    pub const FIRST: usize = SLICE;
+    /// First slot: guard slots come before, a slice of any precision.
+    pub const FIRST: usize = LONG_SLICE;
     /// Slot of a particle in the body's order.
     pub fn slot(particle: usize) -> usize {
         particle + Self::FIRST
     }
     /// Number of slabs.
     pub fn slabs(&self) -> usize {
-        self.slices.div_ceil(self.slab)
+        self.slots.div_ceil(self.slab)
     }
-    /// First slot and number of slices of a slab.
+    /// First slot and number of slots of a slab.
     pub fn slab_range(&self, index: usize) -> (usize, usize) {
         self.piece_range(index, self.slab)
     }
-    /// The same of a piece of another number of slices.
+    /// The same of a piece of another number of slots.
     pub fn piece_range(&self, index: usize, each: usize) -> (usize, usize) {
         let first = index * each;
-        (Self::FIRST + first * SLICE, each.min(self.slices - first))
+        (Self::FIRST + first, each.min(self.slots - first))
+    }
+    /// Slots with the guards before and after them.
+    fn guarded(&self) -> usize {
+        Self::FIRST + self.slots + Self::FIRST
     }
     /// Slices from one component to the next. A distance that is a multiple of 4 kB would map all
     /// components of a particle to the same cache set.
-    fn stride(&self) -> usize {
-        let stride = self.slices + 2;
+    fn stride<E: Real>(&self) -> usize {
+        let stride = self.guarded() / E::SLICE;
         if stride.is_multiple_of(64) {
             stride + 1
         } else {
@@ -63,18 +67,18 @@ impl Layout {
 
 /// `N` components per particle.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Array<const N: usize> {
-    data: Vec<Slots>,
+pub struct Array<const N: usize, E: Real = f64> {
+    data: Vec<E::Slots>,
     layout: Layout,
 }
 
-impl<const N: usize> Array<N> {
+impl<const N: usize, E: Real> Array<N, E> {
     /// All slots, guards included, hold `value`.
     pub fn new(layout: Layout, value: [f64; N]) -> Self {
-        let stride = layout.stride();
+        let stride = layout.stride::<E>();
         let mut data = Vec::with_capacity(N * stride);
         for v in value {
-            data.resize(data.len() + stride, Slots([v; SLICE]));
+            data.resize(data.len() + stride, E::slots(v));
         }
         Self { data, layout }
     }
@@ -84,25 +88,25 @@ impl<const N: usize> Array<N> {
             data: Vec::new(),
             layout: Layout {
                 particles: 0,
-                slices: 0,
-                slab: 1,
+                slots: 0,
+                slab: LONG_SLICE,
             },
         }
     }
-    /// The components, each with its guard slices: index them with a slot.
+    /// The components, each with its guards: index them with a slot.
     #[inline(always)]
-    pub fn components(&self) -> [&[f64]; N] {
-        let stride = self.layout.stride() * SLICE;
-        let all: &[f64] = self.flat();
-        std::array::from_fn(|c| &all[c * stride..(c + 1) * stride])
+    pub fn components(&self) -> [&[E]; N] {
+        let (stride, length) = (self.component_stride(), self.layout.guarded());
+        let all = self.flat();
+        std::array::from_fn(|c| &all[c * stride..c * stride + length])
     }
     /// All numbers; component `c` of slot `s` is `flat()[c * component_stride() + s]`.
-    pub fn flat(&self) -> &[f64] {
-        bytemuck::must_cast_slice(&self.data)
+    pub fn flat(&self) -> &[E] {
+        bytemuck::cast_slice(&self.data)
     }
     /// See [`flat`](Self::flat).
-    pub fn flat_mut(&mut self) -> &mut [f64] {
-        bytemuck::must_cast_slice_mut(&mut self.data)
+    pub fn flat_mut(&mut self) -> &mut [E] {
+        bytemuck::cast_slice_mut(&mut self.data)
     }
     /// Shape.
     pub fn layout(&self) -> Layout {
@@ -114,13 +118,13 @@ impl<const N: usize> Array<N> {
     }
     /// Distance between components, in numbers.
     pub fn component_stride(&self) -> usize {
-        self.layout.stride() * SLICE
+        self.layout.stride::<E>() * E::SLICE
     }
     /// Value of a slot.
     #[inline]
     pub fn get(&self, slot: usize) -> [f64; N] {
         let (all, stride) = (self.flat(), self.component_stride());
-        std::array::from_fn(|c| all[c * stride + slot])
+        std::array::from_fn(|c| all[c * stride + slot].value())
     }
     /// Sets a slot.
     #[inline]
@@ -128,59 +132,58 @@ impl<const N: usize> Array<N> {
         let stride = self.component_stride();
         let all = self.flat_mut();
         for (c, v) in value.into_iter().enumerate() {
-            all[c * stride + slot] = v;
+            all[c * stride + slot] = E::nearest(v);
         }
     }
     /// One piece per slab, by components, without the guards: slot `FIRST + i` of slab 0 is index `i`.
-    pub fn slabs_mut(&mut self) -> Vec<[&mut [f64]; N]> {
+    pub fn slabs_mut(&mut self) -> Vec<[&mut [E]; N]> {
         self.pieces_mut(self.layout.slab)
     }
-    /// The same in pieces of another number of slices.
-    pub fn pieces_mut(&mut self, each: usize) -> Vec<[&mut [f64]; N]> {
-        let Layout { slices, .. } = self.layout;
-        let stride = self.layout.stride();
+    /// The same in pieces of another number of slots.
+    pub fn pieces_mut(&mut self, each: usize) -> Vec<[&mut [E]; N]> {
+        let Layout { slots, .. } = self.layout;
+        let stride = self.component_stride();
         let mut pieces: [_; N] = {
-            let mut components = self.data.chunks_exact_mut(stride);
+            let mut components = self.flat_mut().chunks_exact_mut(stride);
             std::array::from_fn(|_| {
                 let component = components.next().expect("N components");
-                component[1..=slices].chunks_mut(each)
+                component[Layout::FIRST..Layout::FIRST + slots].chunks_mut(each)
             })
         };
-        (0..slices.div_ceil(each))
+        (0..slots.div_ceil(each))
             .map(|_| {
-                std::array::from_fn(|c| {
-                    bytemuck::must_cast_slice_mut(
-                        pieces[c].next().expect("as many pieces as slabs"),
-                    )
-                })
+                std::array::from_fn(|c| pieces[c].next().expect("as many pieces as slabs"))
             })
             .collect()
     }
-    /// Some slices, counted from the first one that holds particles.
-    pub fn part(&self, slices: Range<usize>) -> [&[f64]; N] {
-        let stride = self.layout.stride();
+    /// Some slots, counted from the first one that holds a particle.
+    pub fn part(&self, slots: Range<usize>) -> [&[E]; N] {
+        let (all, stride) = (self.flat(), self.component_stride());
         std::array::from_fn(|c| {
-            let first = c * stride + 1;
-            bytemuck::must_cast_slice(&self.data[first + slices.start..first + slices.end])
+            let first = c * stride + Layout::FIRST;
+            &all[first + slots.start..first + slots.end]
         })
     }
     /// The same to write.
-    pub fn part_mut(&mut self, slices: Range<usize>) -> [&mut [f64]; N] {
-        let mut components = self.data.chunks_exact_mut(self.layout.stride());
+    pub fn part_mut(&mut self, slots: Range<usize>) -> [&mut [E]; N] {
+        let stride = self.component_stride();
+        let mut components = self.flat_mut().chunks_exact_mut(stride);
         std::array::from_fn(|_| {
             let component = components.next().expect("N components");
-            bytemuck::must_cast_slice_mut(&mut component[1 + slices.start..1 + slices.end])
+            &mut component[Layout::FIRST + slots.start..Layout::FIRST + slots.end]
         })
     }
-    /// Repeats the first slice that holds particles as slice `at`.
+    /// Repeats the first slice that holds particles in the slots from `at` on.
     pub fn repeat_first(&mut self, at: usize) {
-        for component in self.data.chunks_exact_mut(self.layout.stride()) {
-            component[1 + at] = component[1];
+        let stride = self.component_stride();
+        for component in self.flat_mut().chunks_exact_mut(stride) {
+            let first = Layout::FIRST..Layout::FIRST + E::SLICE;
+            component.copy_within(first, Layout::FIRST + at);
         }
     }
     /// Sets every slot, guards included.
     pub fn fill(&mut self, value: f64) {
-        self.data.fill(Slots([value; SLICE]));
+        self.data.fill(E::slots(value));
     }
     /// Copies an array of the same layout.
     pub fn copy_from(&mut self, other: &Self) {
@@ -195,7 +198,7 @@ impl<const N: usize> Array<N> {
 /// Components cut to a length that they have: in a loop that begins with it, one check of an index
 /// serves them all.
 #[inline(always)]
-pub fn level<const N: usize>(mut components: [&[f64]; N], length: usize) -> [&[f64]; N] {
+pub fn level<const N: usize, E>(mut components: [&[E]; N], length: usize) -> [&[E]; N] {
     // Not by `map`, which the compiler does not see through.
     let mut c = 0;
     while c < N {
@@ -215,9 +218,9 @@ mod tests {
             let layout = Layout::new(particles);
             let mut array = Array::<3>::new(layout, [-1.0; 3]);
             for (s, piece) in array.slabs_mut().into_iter().enumerate() {
-                let (first, slices) = layout.slab_range(s);
+                let (first, slots) = layout.slab_range(s);
                 for (c, values) in piece.into_iter().enumerate() {
-                    assert_eq!(values.len(), slices * SLICE);
+                    assert_eq!(values.len(), slots);
                     for (i, v) in values.iter_mut().enumerate() {
                         assert_eq!(*v, -1.0);
                         *v = (1000 * (first + i) + c) as f64;
@@ -229,8 +232,9 @@ mod tests {
                 assert_eq!(array.get(slot), [0, 1, 2].map(|c| (1000 * slot + c) as f64));
             }
             for c in array.components() {
-                assert!(c[..SLICE].iter().all(|v| *v == -1.0));
-                assert!(c[SLICE * (layout.slices + 1)..].iter().all(|v| *v == -1.0));
+                assert!(c[..Layout::FIRST].iter().all(|v| *v == -1.0));
+                let end = Layout::FIRST + layout.slots;
+                assert!(c[end..].iter().all(|v| *v == -1.0));
             }
         }
     }

@@ -4,7 +4,7 @@
 
 use std::ops::Deref;
 
-use crate::lane::{INVERSE_FACTORIALS, Lane};
+use crate::lane::{INVERSE_FACTORIALS, Lane, Precise, Real};
 
 /// A vector.
 pub type Vec3<T> = [T; 3];
@@ -122,7 +122,7 @@ pub fn scale_all<T: Lane, const N: usize>(s: T, a: &[T; N]) -> [T; N] {
 #[inline(always)]
 pub fn load_all<T: Lane, const N: usize>(
     token: T::Token,
-    from: &[impl Deref<Target = [f64]>; N],
+    from: &[impl Deref<Target = [impl Real]>; N],
     at: usize,
 ) -> [T; N] {
     let mut all = [T::splat(token, 0.0); N];
@@ -320,7 +320,7 @@ fn polynomial<T: Lane>(
 /// The logarithm of a symmetric positive definite tensor. Near the identity, where the elastic
 /// strains of metals are, it is 2 artanh(Z), Z = (B - I)(B + I)^-1; the eigenvalues serve elsewhere.
 #[inline(always)]
-pub fn ln_symmetric<T: Lane>(b: &Sym3<T>) -> Sym3<T> {
+pub fn ln_symmetric<T: Precise>(b: &Sym3<T>) -> Sym3<T> {
     // artanh(Z)/Z to Z^14: the remainder is below 4e-17 for |B - I| <= 0.2.
     const TERMS: u32 = 8;
     let one = b[0].of(1.0);
@@ -355,7 +355,7 @@ pub fn ln_symmetric<T: Lane>(b: &Sym3<T>) -> Sym3<T> {
 
 /// The exponential of a symmetric tensor: its series where it is small, by its eigenvalues elsewhere.
 #[inline(always)]
-pub fn exp_symmetric<T: Lane>(a: &Sym3<T>) -> Sym3<T> {
+pub fn exp_symmetric<T: Precise>(a: &Sym3<T>) -> Sym3<T> {
     // To A^12: the remainder is below 3e-17 for |A| <= 0.3.
     let outside = square(a) - a[0].of(0.09);
     let near = polynomial(

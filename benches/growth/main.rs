@@ -15,8 +15,9 @@ const SIZES: [u32; 7] = [5, 8, 11, 16, 25, 36, 55];
 
 /// Name, overrides, whether steps are measured: pair vectors are stored from an update of the reference on, which
 /// belongs to its own steps.
-const BODIES: [(&str, &[&str], bool); 4] = [
+const BODIES: [(&str, &[&str], bool); 5] = [
     ("lattice", &[], true),
+    ("single precision", &["numerics.precision=single"], true),
     (
         "stored vectors",
         &[

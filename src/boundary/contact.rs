@@ -25,7 +25,6 @@ use super::Boundary;
 use crate::error::{Error, Result};
 use crate::formulation::url::State;
 use crate::integrator::SSP_RK3;
-use crate::lane::SLICE;
 use crate::layout::{Array, Layout};
 use crate::ledger::ContactResultant;
 use crate::math::*;
@@ -249,8 +248,8 @@ impl Boundary {
         let layout = x.layout();
         let (x, v) = (x.components(), v.components());
         let found = parallel::map_slabs((0..layout.slabs()).collect(), |_, slab| {
-            let (first, slices) = layout.slab_range(slab);
-            let end = (first + slices * SLICE).min(Layout::slot(layout.particles));
+            let (first, slots) = layout.slab_range(slab);
+            let end = (first + slots).min(Layout::slot(layout.particles));
             let mut found = Vec::new();
             for slot in first..end {
                 for (index, (wall, state)) in self.walls.iter().zip(walls).enumerate() {

@@ -17,12 +17,12 @@
 use super::passes::{ForceInput, HalfSlope, Kinematics, lanes_of};
 use super::riemann;
 use super::url::Runner;
-use crate::lane::{Lane, PerSlot, Work};
+use crate::lane::{Lane, PerSlot, Real, Work};
 use crate::layout::{Array, Layout};
 use crate::material::Thermal;
 use crate::math::*;
 use crate::parallel;
-use crate::reference::{PairVectors, load3, load9, store3, with_pairs};
+use crate::reference::{PairVectors, Reference, load3, load9, store3, with_pairs};
 
 /// e above: an alternating temperature then decays as fast as the gradients' highest mode, so that
 /// the term costs nothing of the stable step.
@@ -66,7 +66,7 @@ impl Conduction {
     /// Heat into each particle [W]; the entropy produced [W/K] and the stable step [s].
     pub fn rates<R: Runner>(
         &mut self,
-        input: &ForceInput,
+        input: &ForceInput<impl Real>,
         kinematics: &Kinematics,
         theta: &Array<2>,
         heat: &mut Array<1>,
@@ -74,21 +74,21 @@ impl Conduction {
         let (reference, kinematics, thermal) = (input.reference, *kinematics, self.thermal);
         let [theta, beta] = theta.components();
         parallel::map_slabs(self.half_slope.slabs_mut(), |slab, out| {
-            with_pairs!(reference, pairs => R::run(HalfSlope {
+            with_pairs!(reference.pair_vectors(), pairs => R::run(HalfSlope {
                 pairs, reference, kinematics, field: beta, slab, out,
             }));
         });
         let half_slope = self.half_slope.components();
         let slabs: Vec<_> = std::iter::zip(self.flux.slabs_mut(), heat.slabs_mut()).collect();
         let found = parallel::map_slabs(slabs, |slab, (flux, [heat])| {
-            with_pairs!(reference, pairs => R::run(Jumps {
+            with_pairs!(reference.pair_vectors(), pairs => R::run(Jumps {
                 pairs, input: *input, kinematics, thermal, theta, beta, half_slope, slab, flux, heat,
             }))
         });
         let flux = self.flux.components();
         parallel::map_slabs(heat.slabs_mut(), |slab, [heat]| {
-            with_pairs!(reference, pairs => R::run(Divergence {
-                pairs, input: *input, flux, slab, heat,
+            with_pairs!(reference.pair_vectors(), pairs => R::run(Divergence {
+                pairs, reference, flux, slab, heat,
             }));
         });
         let (entropy, length2) = found
@@ -107,7 +107,7 @@ impl Conduction {
     /// bears 0.65 times, a cube of 2^3 particles 0.55 times the step of a block.
     pub fn calibrate<R: Runner>(
         &mut self,
-        input: &ForceInput,
+        input: &ForceInput<impl Real>,
         kinematics: &Kinematics,
         heat: &mut Array<1>,
     ) {
@@ -152,9 +152,9 @@ impl Conduction {
 }
 
 /// s_ab and the fluxes; (entropy produced, smallest |x_ab|^2 V_R/v) of the slab.
-struct Jumps<'a, P> {
+struct Jumps<'a, P, E: Real> {
     pairs: P,
-    input: ForceInput<'a>,
+    input: ForceInput<'a, E>,
     kinematics: Kinematics<'a>,
     thermal: Thermal,
     theta: &'a [f64],
@@ -165,7 +165,7 @@ struct Jumps<'a, P> {
     heat: &'a mut [f64],
 }
 
-impl<P: PairVectors> Work for Jumps<'_, P> {
+impl<P: PairVectors, E: Real> Work for Jumps<'_, P, E> {
     type Output = (f64, f64);
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) -> (f64, f64) {
@@ -234,7 +234,7 @@ impl<P: PairVectors> Work for Jumps<'_, P> {
 /// Heat by the divergence of the fluxes.
 struct Divergence<'a, P> {
     pairs: P,
-    input: ForceInput<'a>,
+    reference: &'a Reference,
     flux: [&'a [f64]; 3],
     slab: usize,
     heat: &'a mut [f64],
@@ -244,11 +244,11 @@ impl<P: PairVectors> Work for Divergence<'_, P> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
-        for (at, a) in lanes_of::<T>(self.input.reference, self.slab) {
+        for (at, a) in lanes_of::<T>(self.reference, self.slab) {
             let centre = self.pairs.centre::<T>(token, a);
             let flux_a = load3::<T>(token, &self.flux, a);
             let mut heat = T::load(token, self.heat, at);
-            for (b, pair) in self.input.reference.slices.of(a) {
+            for (b, pair) in self.reference.slices.of(a) {
                 let (g, back) = self.pairs.pair(token, &centre, b, pair);
                 heat = heat - (dot(flux_a, g) - dot(load3(token, &self.flux, b), back));
             }

@@ -2,7 +2,7 @@
 
 use super::passes::{Kinematics, PointOutput, first_breakdown, lanes_from, lanes_of};
 use super::url::{Breakdown, Runner, Trouble};
-use crate::lane::{Lane, PerSlot, Work, vectorised};
+use crate::lane::{PerSlot, Precise, Real, Work, vectorised};
 use crate::material::{Deformation, Material, Thermal};
 use crate::math::*;
 use crate::reference::{Reference, store9};
@@ -30,20 +30,20 @@ pub(super) struct LawInputs<'a> {
     pub elapsed: f64,
 }
 
-/// The law pass: stress, temperature and energy of a run of slices from the total deformation.
+/// The law pass: stress, temperature and energy of a run of slots from the total deformation.
 ///
 /// `FLOW` tells when the loop is compiled whether the history is mapped.
-pub(super) struct Laws<'a, 'o, 'p, M, const FLOW: bool> {
+pub(super) struct Laws<'a, 'o, 'p, M, E: Real, const FLOW: bool> {
     pub law: M,
     pub inputs: LawInputs<'a>,
     pub run: (usize, usize),
-    pub out: &'o mut PointOutput<'p>,
+    pub out: &'o mut PointOutput<'p, E>,
 }
 
-impl<M: Material, const FLOW: bool> Work for Laws<'_, '_, '_, M, FLOW> {
+impl<M: Material, E: Real, const FLOW: bool> Work for Laws<'_, '_, '_, M, E, FLOW> {
     type Output = std::result::Result<Stored, Breakdown>;
     #[inline(always)]
-    fn run<T: Lane>(self, token: T::Token) -> Self::Output {
+    fn run<T: Precise>(self, token: T::Token) -> Self::Output {
         let Self { law, run, .. } = self;
         let PointOutput { kept, block } = self.out;
         let LawInputs {
@@ -130,7 +130,7 @@ pub(super) struct Flow<'a, M> {
 impl<M: Material> Work for Flow<'_, M> {
     type Output = Plastic;
     #[inline(always)]
-    fn run<T: Lane>(mut self, token: T::Token) -> Plastic {
+    fn run<T: Precise>(mut self, token: T::Token) -> Plastic {
         let volume = self.reference.volume.components()[0];
         let elapsed = T::splat(token, self.elapsed);
         let [mut work, mut heat, mut entropy] = [PerSlot::new(0.0); 3];
@@ -206,23 +206,23 @@ pub(super) fn flow<M: Material>(work: Flow<M>) -> Plastic {
     }
 }
 
-/// The law pass of a run of slices, compiled for what the body has; with `flow` a history is mapped.
-pub(super) fn stresses<R: Runner, M: Material>(
+/// The law pass of a run of slots, compiled for what the body has; with `flow` a history is mapped.
+pub(super) fn stresses<R: Runner, M: Material, E: Real>(
     law: M,
     inputs: LawInputs,
     flow: bool,
     run: (usize, usize),
-    out: &mut PointOutput,
+    out: &mut PointOutput<E>,
 ) -> std::result::Result<Stored, Breakdown> {
     if M::HISTORY && flow {
-        R::run(Laws::<M, true> {
+        R::run(Laws::<M, E, true> {
             law,
             inputs,
             run,
             out,
         })
     } else {
-        R::run(Laws::<M, false> {
+        R::run(Laws::<M, E, false> {
             law,
             inputs,
             run,

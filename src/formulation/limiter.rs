@@ -16,7 +16,7 @@ pub fn venkatakrishnan<T: Lane>(rise: T, fall: T, step: T) -> T {
         admissible * magnitude,
         magnitude * magnitude,
     );
-    let (two, tiny) = (step.of(2.0), step.of(1e-300));
+    let (two, tiny) = (step.of(2.0), step.of(T::TINY));
     (a2 + two * ab + tiny) / (a2 + ab + two * b2 + tiny)
 }
 
@@ -31,7 +31,7 @@ pub fn minmod_jump<T: Lane>(
     half_a: Vec3<T>,
     half_b: Vec3<T>,
 ) -> Vec3<T> {
-    let (one, tiny) = (dx2.of(1.0), dx2.of(1e-300));
+    let (one, tiny) = (dx2.of(1.0), dx2.of(T::TINY));
     let inverse = one / (dx2 + tiny);
     // Components along dx, as multiples of dx.
     let jump_n = dot(dv, dx) * inverse;
@@ -92,10 +92,15 @@ pub fn shock_jump<T: Lane>(
     let rate2 = dx2.of(0.5).mul_add(shear, axial);
     let dilatation2 = (trace * trace).min(rate2);
     let smooth = dx2.of(UNRESOLVED * UNRESOLVED) * m2;
-    let w6 = w2 * w2 * w2;
-    let jumps = (dilatation2 * dilatation2) * w6;
-    let all = (rate2 * rate2) * (smooth * smooth).mul_add(smooth, w6);
-    let along = factor * m * jumps / all.mul_add(dx2, dx2.of(1e-300));
+    // Shares of one, and speeds instead of rates: their powers stay in the range of single precision.
+    let tiny = dx2.of(T::TINY);
+    let unit = dx2.of(1.0) / (w2 + smooth + tiny);
+    let (p, s) = (w2 * unit, smooth * unit);
+    let p3 = p * p * p;
+    let (dilatation2, rate2) = (dilatation2 * dx2, rate2 * dx2);
+    let jumps = (dilatation2 * dilatation2) * p3;
+    let all = (rate2 * rate2) * (s * s).mul_add(s, p3);
+    let along = factor * m * jumps / all.mul_add(dx2, tiny);
     let none = dx2.of(0.0);
     axpy3(w, (m * (m + w_n)).if_positive(along, none), dx)
 }
@@ -103,7 +108,7 @@ pub fn shock_jump<T: Lane>(
 /// part / whole in [0, 1/2]; 0 where the whole vanishes.
 #[inline(always)]
 fn share<T: Lane>(part: T, whole: T) -> T {
-    (part / (whole + part.of(1e-300)))
+    (part / (whole + part.of(T::TINY)))
         .max(part.of(0.0))
         .min(part.of(0.5))
 }

@@ -1,4 +1,4 @@
-//! The passes of [`super::url`] over a run of slices, written once over lanes.
+//! The passes of [`super::url`] over a run of slots, written once over lanes.
 
 use std::ops::Range;
 
@@ -6,12 +6,12 @@ use super::limiter;
 use super::riemann::{self, Pair, WaveSpeeds};
 use super::sweep::{Block, BlockPart};
 use super::url::{Breakdown, State, Trouble};
-use crate::lane::{Lane, PerSlot, SLICE, Work};
+use crate::lane::{Lane, PairWork, PerSlot, Real, Work};
 use crate::layout::{Array, Layout, level};
 use crate::material::Deformation;
 use crate::math::*;
 use crate::parallel;
-use crate::reference::{PairVectors, Reference, load3, load9, store3, store9};
+use crate::reference::{PairVectors, Reference, Slices, load3, load9, store3, store9};
 
 /// Read access to a state and its reference, by components.
 #[derive(Clone, Copy)]
@@ -64,13 +64,13 @@ impl<'a> Kinematics<'a> {
 }
 
 #[inline(always)]
-pub(super) fn load_slab3<T: Lane>(token: T::Token, from: &[&mut [f64]; 3], at: usize) -> Vec3<T> {
+pub(super) fn load_slab3<T: Lane>(token: T::Token, from: &[&mut [impl Real]; 3], at: usize) -> Vec3<T> {
     let [a, b, c] = from;
     load3(token, &[a, b, c], at)
 }
 
 #[inline(always)]
-pub(super) fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [f64]; 9], at: usize) -> Mat3<T> {
+pub(super) fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [impl Real]; 9], at: usize) -> Mat3<T> {
     let [a, b, c, d, e, f, g, h, i] = from;
     load9(token, &[a, b, c, d, e, f, g, h, i], at)
 }
@@ -84,27 +84,28 @@ pub(super) fn lanes_of<T: Lane>(
     lanes_from::<T>(reference.layout.slab_range(slab))
 }
 
-/// The same of a run of slices: its first slot, and how many they are.
+/// The same of a run of slots: the first one, and how many they are.
 #[inline(always)]
 pub(super) fn lanes_from<T: Lane>(
-    (first, slices): (usize, usize),
+    (first, slots): (usize, usize),
 ) -> impl Iterator<Item = (usize, usize)> {
     std::iter::zip(
-        (0..slices * SLICE).step_by(T::WIDTH),
+        (0..slots).step_by(T::WIDTH),
         (first..).step_by(T::WIDTH),
     )
 }
 
 /// Gradient of a vector field with respect to the reference (54).
-pub(super) struct Gradient<'a, 'o, 'p, P> {
+pub(super) struct Gradient<'a, 'o, 'p, P, E: Real> {
+    pub slices: &'a Slices<E>,
     pub pairs: P,
     pub reference: &'a Reference,
-    pub field: [&'a [f64]; 3],
+    pub field: [&'a [E]; 3],
     pub run: (usize, usize),
     pub out: &'o mut [&'p mut [f64]; 9],
 }
 
-impl<P: PairVectors> Work for Gradient<'_, '_, '_, P> {
+impl<P: PairVectors, E: Real> PairWork for Gradient<'_, '_, '_, P, E> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
@@ -115,7 +116,7 @@ impl<P: PairVectors> Work for Gradient<'_, '_, '_, P> {
             let centre = pairs.centre::<T>(token, a);
             let own = load3::<T>(token, &field, a);
             let mut sum = [zero3(token); 3];
-            for (b, pair) in self.reference.slices.of(a) {
+            for (b, pair) in self.slices.of(a) {
                 let (g, _) = pairs.pair(token, &centre, b, pair);
                 sum = add_outer(&sum, sub3(load3(token, &field, b), own), g);
             }
@@ -124,7 +125,7 @@ impl<P: PairVectors> Work for Gradient<'_, '_, '_, P> {
     }
 }
 
-/// What the gradient, law and point passes leave for later, of a run of slices.
+/// What the gradient, law and point passes leave for later, of a run of slots.
 pub(super) struct Kept<'a> {
     pub grad_v: [&'a mut [f64]; 9],
     pub sigma_j: Option<&'a mut [f64]>,
@@ -133,9 +134,8 @@ pub(super) struct Kept<'a> {
 }
 
 impl Kept<'_> {
-    /// Some of the slices.
-    pub fn part(&mut self, slices: Range<usize>) -> Kept<'_> {
-        let range = slices.start * SLICE..slices.end * SLICE;
+    /// Some of the slots.
+    pub fn part(&mut self, range: Range<usize>) -> Kept<'_> {
         Kept {
             grad_v: self.grad_v.each_mut().map(|c| &mut c[range.clone()]),
             sigma_j: self.sigma_j.as_mut().map(|s| &mut s[range.clone()]),
@@ -147,16 +147,16 @@ impl Kept<'_> {
     }
 }
 
-/// Output of the gradient, law and point passes for a run of slices.
-pub(super) struct PointOutput<'a> {
+/// Output of the gradient, law and point passes for a run of slots.
+pub(super) struct PointOutput<'a, E: Real> {
     pub kept: Kept<'a>,
     /// As Q, P from the law pass, where formulation and material meet; Q from the point pass.
-    pub block: BlockPart<'a>,
+    pub block: BlockPart<'a, E>,
 }
 
 /// The rest of one particle that its neighbours need, from the incremental deformation; kinetic
 /// energy of the run.
-pub(super) struct Points<'a, 'o, 'p> {
+pub(super) struct Points<'a, 'o, 'p, E: Real> {
     pub density: f64,
     pub kinematics: Kinematics<'a>,
     pub reference: &'a Reference,
@@ -164,7 +164,7 @@ pub(super) struct Points<'a, 'o, 'p> {
     /// Spacing tensors ([`spacings`]), where they bound the step.
     pub spacing: Option<[&'a [f64]; 6]>,
     pub run: (usize, usize),
-    pub out: &'o mut PointOutput<'p>,
+    pub out: &'o mut PointOutput<'p, E>,
 }
 
 /// What the point pass sums over a run.
@@ -176,7 +176,7 @@ pub(super) struct Motion {
     pub length2: f64,
 }
 
-impl Work for Points<'_, '_, '_> {
+impl<E: Real> Work for Points<'_, '_, '_, E> {
     type Output = std::result::Result<Motion, Breakdown>;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> Self::Output {
@@ -323,15 +323,15 @@ pub(super) fn immovable(v: Vec3<f64>, mass: f64) -> Option<Trouble> {
 }
 
 /// Scales the gradients for the reconstruction by Venkatakrishnan's limiter.
-pub(super) struct Limit<'a, 'o, 'p> {
+pub(super) struct Limit<'a, 'o, 'p, E: Real> {
     pub reference: &'a Reference,
     pub x: [&'a [f64]; 3],
     pub v: [&'a [f64]; 3],
     pub run: (usize, usize),
-    pub half_grad: &'o mut [&'p mut [f64]; 9],
+    pub half_grad: &'o mut [&'p mut [E]; 9],
 }
 
-impl Work for Limit<'_, '_, '_> {
+impl<E: Real> Work for Limit<'_, '_, '_, E> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
@@ -367,28 +367,31 @@ impl Work for Limit<'_, '_, '_> {
 
 /// What the force pass reads of the neighbours.
 #[derive(Clone, Copy)]
-pub(super) struct ForceInput<'a> {
+pub(super) struct ForceInput<'a, E: Real> {
     pub reference: &'a Reference,
-    x: [&'a [f64]; 3],
-    v: [&'a [f64]; 3],
-    q: [&'a [f64]; 9],
-    s: [&'a [f64]; 9],
-    half_grad: [&'a [f64]; 9],
-    wave: [&'a [f64]; 2],
+    /// Each pair's neighbours, for the passes in this precision.
+    slices: &'a Slices<E>,
+    x: [&'a [E]; 3],
+    v: [&'a [E]; 3],
+    q: [&'a [E]; 9],
+    s: [&'a [E]; 9],
+    half_grad: [&'a [E]; 9],
+    wave: [&'a [E]; 2],
     /// Slot that stands first in q, s, half_grad and wave, and what the distance to it is cut to in a ring.
     first: usize,
     mask: usize,
 }
 
-impl<'a> ForceInput<'a> {
+impl<'a, E: Real> ForceInput<'a, E> {
     /// With the block of the whole body.
-    pub(super) fn new(state: &'a State, reference: &'a Reference, block: &'a Block) -> Self {
+    pub(super) fn new(motion: [[&'a [E]; 3]; 2], reference: &'a Reference, slices: &'a Slices<E>, block: &'a Block<E>) -> Self {
         let tensors =
-            |array: &'a Option<Array<9>>| array.as_ref().map_or([&[][..]; 9], Array::components);
+            |array: &'a Option<Array<9, E>>| array.as_ref().map_or([&[][..]; 9], Array::components);
         Self {
             reference,
-            x: state.x.components(),
-            v: state.v.components(),
+            slices,
+            x: motion[0],
+            v: motion[1],
             q: block.q.components(),
             s: tensors(&block.s),
             half_grad: tensors(&block.half_grad),
@@ -398,11 +401,11 @@ impl<'a> ForceInput<'a> {
         }
     }
 
-    /// The same where the block is a ring of so many slices, a power of two, which begins with the slot `first`.
+    /// The same where the block is a ring of so many slots, a power of two, which begins with the slot `first`.
     pub(super) fn in_ring(self, first: usize, capacity: usize) -> Self {
         Self {
             first,
-            mask: capacity * SLICE - 1,
+            mask: capacity - 1,
             ..self
         }
     }
@@ -492,7 +495,7 @@ impl<'a> ForceInput<'a> {
         let (qa, sa) = (self.stress((), a), self.area((), a));
         let grad_a = self.half_grad((), a);
         let mut force = [0.0; 3];
-        for (b, pair) in self.reference.slices.of(a) {
+        for (b, pair) in self.slices.of(a) {
             let (g, back) = pairs.pair((), &centre, b, pair);
             let mut p = self.pair(&here, b);
             p.area = self.pair_area(&sa, b, (g, back));
@@ -580,9 +583,9 @@ impl<T: Lane> Areas<T> {
 /// dissipation, smallest squared |x_ab| lambda_ab) of these pairs.
 ///
 /// Each pair is computed once, for both of its particles: what it does to the second is taken off there.
-pub(super) struct Forces<'a, 'o, 'p, P, const MODE: u8> {
+pub(super) struct Forces<'a, 'o, 'p, P, E: Real, const MODE: u8> {
     pub pairs: P,
-    pub input: ForceInput<'a>,
+    pub input: ForceInput<'a, E>,
     pub speeds: WaveSpeeds<f64>,
     /// Share of the dissipation in resolved flow.
     pub coefficient: f64,
@@ -591,10 +594,10 @@ pub(super) struct Forces<'a, 'o, 'p, P, const MODE: u8> {
     pub run: (usize, usize),
     /// Where the run begins in its chunk, and the forces there.
     pub from: usize,
-    pub sums: &'o mut Sums<'p>,
+    pub sums: &'o mut Sums<'p, E>,
 }
 
-impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
+impl<P: PairVectors, E: Real, const MODE: u8> PairWork for Forces<'_, '_, '_, P, E, MODE> {
     type Output = (f64, f64);
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> (f64, f64) {
@@ -609,7 +612,7 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
             sums,
         } = self;
         let (input, pairs) = input.level::<P, MODE>(pairs);
-        let slices = &input.reference.slices;
+        let slices = input.slices;
         let weights = slices.weights();
         let speeds = WaveSpeeds {
             pressure: T::splat(token, coefficient * speeds.pressure),
@@ -666,17 +669,17 @@ impl<P: PairVectors, const MODE: u8> Work for Forces<'_, '_, '_, P, MODE> {
     }
 }
 
-/// Sums over pairs of a chunk, and of as many slices behind it as its pairs reach.
-pub(super) struct Sums<'a> {
-    pub out: [&'a mut [f64]; 3],
-    pub behind: [&'a mut [f64]; 3],
+/// Sums over pairs of a chunk, and of as many slots behind it as its pairs reach.
+pub(super) struct Sums<'a, E: Real> {
+    pub out: [&'a mut [E]; 3],
+    pub behind: [&'a mut [E]; 3],
 }
 
-impl Sums<'_> {
+impl<E: Real> Sums<'_, E> {
     /// Begins with nothing.
     pub fn clear(&mut self) {
         let all = self.out.iter_mut().chain(&mut self.behind);
-        all.for_each(|c| c.fill(0.0));
+        all.for_each(|c| c.fill(E::nearest(0.0)));
     }
     /// Adds at a place of the chunk.
     #[inline(always)]
@@ -688,11 +691,11 @@ impl Sums<'_> {
 
 /// Takes a vector off what stands at a place of a chunk, or behind its end.
 #[inline(always)]
-fn take_off<T: Lane>(value: Vec3<T>, sums: &mut Sums, at: usize) {
+fn take_off<T: Lane, E: Real>(value: Vec3<T>, sums: &mut Sums<E>, at: usize) {
     let Sums { out: chunk, behind } = sums;
     let end = chunk[0].len();
     let token = value[0].token();
-    let within = |to: &mut [&mut [f64]; 3], at: usize| {
+    let within = |to: &mut [&mut [E]; 3], at: usize| {
         store3(&sub3(load_slab3(token, to, at), value), to, at);
     };
     if at + T::WIDTH <= end {
@@ -701,24 +704,27 @@ fn take_off<T: Lane>(value: Vec3<T>, sums: &mut Sums, at: usize) {
         within(behind, at - end);
     } else {
         for c in 0..3 {
-            value[c].for_lanes(|lane, v| match (at + lane).checked_sub(end) {
-                None => chunk[c][at + lane] -= v,
-                Some(at) => behind[c][at] -= v,
+            value[c].for_lanes(|lane, v| {
+                let sum = match (at + lane).checked_sub(end) {
+                    None => &mut chunk[c][at + lane],
+                    Some(at) => &mut behind[c][at],
+                };
+                *sum = E::nearest(sum.value() - v);
             });
         }
     }
 }
 
 /// Smallest squared length that the areas of the pairs allow the particles of one slab.
-pub(super) struct AreaLengths<'a, P> {
+pub(super) struct AreaLengths<'a, P, E: Real> {
     pub pairs: P,
-    pub input: ForceInput<'a>,
+    pub input: ForceInput<'a, E>,
     /// rho_R [kg/m^3].
     pub density: f64,
     pub slab: usize,
 }
 
-impl<P: PairVectors> Work for AreaLengths<'_, P> {
+impl<P: PairVectors, E: Real> Work for AreaLengths<'_, P, E> {
     type Output = f64;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> f64 {
@@ -769,16 +775,16 @@ fn bounded_share<T: Lane>(jumps: T, half_steps: T) -> T {
 ///
 /// This sums what the jumps dissipate (first component) and what half of the reconstructed steps take of it (second)
 /// over the pairs whose first particle lies in a chunk, for both particles as [`Forces`] does.
-pub(super) struct Dissipated<'a, 'o, 'p, P> {
+pub(super) struct Dissipated<'a, 'o, 'p, P, E: Real> {
     pub pairs: P,
-    pub input: ForceInput<'a>,
+    pub input: ForceInput<'a, E>,
     pub speeds: WaveSpeeds<f64>,
     /// All of a chunk.
     pub run: (usize, usize),
-    pub sums: &'o mut Sums<'p>,
+    pub sums: &'o mut Sums<'p, E>,
 }
 
-impl<P: PairVectors> Work for Dissipated<'_, '_, '_, P> {
+impl<P: PairVectors, E: Real> PairWork for Dissipated<'_, '_, '_, P, E> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
@@ -794,7 +800,7 @@ impl<P: PairVectors> Work for Dissipated<'_, '_, '_, P> {
             let centre = pairs.centre::<T>(token, a);
             let (sa, half_a) = (input.area::<T>(token, a), input.half_grad::<T>(token, a));
             let (mut jumps, mut half_steps) = (zero, zero);
-            for (b, pair) in input.reference.slices.after(a) {
+            for (b, pair) in input.slices.after(a) {
                 let vectors = pairs.pair(token, &centre, b, pair);
                 let mut p = input.pair(&here, b);
                 p.area = input.pair_area(&sa, b, vectors);
@@ -811,13 +817,13 @@ impl<P: PairVectors> Work for Dissipated<'_, '_, '_, P> {
 }
 
 /// Scales the gradients of a slab by what [`Dissipated`] found.
-pub(super) struct Bound<'a> {
-    pub sums: [&'a [f64]; 3],
+pub(super) struct Bound<'a, E: Real> {
+    pub sums: [&'a [E]; 3],
     pub run: (usize, usize),
-    pub half_grad: [&'a mut [f64]; 9],
+    pub half_grad: [&'a mut [E]; 9],
 }
 
-impl Work for Bound<'_> {
+impl<E: Real> PairWork for Bound<'_, E> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) {
@@ -865,16 +871,16 @@ impl<P: PairVectors> Work for HalfSlope<'_, P> {
 }
 
 /// Scales the slopes for the reconstruction of D^j, as [`Bound`] the gradients for that of D^p.
-pub(super) struct BoundSlope<'a, P> {
+pub(super) struct BoundSlope<'a, P, E: Real> {
     pub pairs: P,
-    pub input: ForceInput<'a>,
+    pub input: ForceInput<'a, E>,
     pub sigma: &'a [f64],
     pub pressure_speed: f64,
     pub slab: usize,
     pub half_slope: [&'a mut [f64]; 3],
 }
 
-impl<P: PairVectors> Work for BoundSlope<'_, P> {
+impl<P: PairVectors, E: Real> Work for BoundSlope<'_, P, E> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) {
@@ -904,9 +910,9 @@ impl<P: PairVectors> Work for BoundSlope<'_, P> {
 }
 
 /// dj/dt by D^j (56, 59); power that it dissipates in the slab.
-pub(super) struct VolumeRates<'a, P> {
+pub(super) struct VolumeRates<'a, P, E: Real> {
     pub pairs: P,
-    pub input: ForceInput<'a>,
+    pub input: ForceInput<'a, E>,
     pub sigma: &'a [f64],
     pub slope: [&'a [f64]; 3],
     pub j_chi: Option<&'a [f64]>,
@@ -916,7 +922,7 @@ pub(super) struct VolumeRates<'a, P> {
     pub out: &'a mut [f64],
 }
 
-impl<P: PairVectors> Work for VolumeRates<'_, P> {
+impl<P: PairVectors, E: Real> Work for VolumeRates<'_, P, E> {
     type Output = f64;
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) -> f64 {

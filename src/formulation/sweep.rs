@@ -15,18 +15,21 @@ use std::ops::Range;
 use super::laws::{LawInputs, stresses};
 use super::passes::{
     Bound, Dissipated, ForceInput, Forces, Gradient, Kept, Limit, Motion, PointOutput, Points, Sums,
+    lanes_from,
 };
+use crate::math::*;
 use super::riemann::{self, WaveSpeeds};
 use super::url::{Breakdown, Evaluation, Runner, State};
-use crate::lane::{SLICE, Slots};
+use crate::lane::{Precise, Real, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::material::{Law, with_law};
 use crate::parallel::{self, PerThread};
-use crate::reference::{PairVectors, Pairs, Reference, with_pairs};
+use crate::reference::{PairVectors, Pairs, Reference, ReferenceReal, Slices, load3, store3, with_pairs};
 
-/// Slices that a pass does at a time: few enough that what the next pass reads is still in a near cache, enough to
+
+/// Slots that a pass does at a time: few enough that what the next pass reads is still in a near cache, enough to
 /// make the bookkeeping negligible.
-const TILE: usize = 32;
+const TILE: usize = 256;
 
 /// Chunks that a body has, to feed many threads, where they can be several times as long as the reach then. Copying heads takes
 /// a quarter of an evaluation where chunks are just as long, a tenth where they are twice as long, and nothing
@@ -34,28 +37,28 @@ const TILE: usize = 32;
 const CHUNKS: usize = 24;
 const REACHES: (usize, usize) = (3, 16);
 
-/// What the pairs of the force pass read of the particles of some slices.
+/// What the pairs of the force pass read of the particles in some slots.
 #[derive(Debug)]
-pub(super) struct Block {
+pub(super) struct Block<E: Real> {
     /// Q_a.
-    pub q: Array<9>,
+    pub q: Array<9, E>,
     /// S_a; only where a dissipation is on.
-    pub s: Option<Array<9>>,
+    pub s: Option<Array<9, E>>,
     /// Half the spatial velocity gradient, 1/2 grad_chi v f^-1, limited if a limiter is on [1/s].
-    pub half_grad: Option<Array<9>>,
+    pub half_grad: Option<Array<9, E>>,
     /// (smallest stretch, spatial density).
-    pub wave: Array<2>,
+    pub wave: Array<2, E>,
 }
 
 /// A part of a block, to be written.
-pub(super) struct BlockPart<'a> {
-    pub q: [&'a mut [f64]; 9],
-    pub s: Option<[&'a mut [f64]; 9]>,
-    pub half_grad: Option<[&'a mut [f64]; 9]>,
-    pub wave: [&'a mut [f64]; 2],
+pub(super) struct BlockPart<'a, E> {
+    pub q: [&'a mut [E]; 9],
+    pub s: Option<[&'a mut [E]; 9]>,
+    pub half_grad: Option<[&'a mut [E]; 9]>,
+    pub wave: [&'a mut [E]; 2],
 }
 
-impl Block {
+impl<E: Real> Block<E> {
     fn new(layout: Layout, areas: bool, gradients: bool) -> Self {
         Self {
             q: Array::new(layout, [0.0; 9]),
@@ -65,17 +68,17 @@ impl Block {
         }
     }
 
-    fn part_mut(&mut self, slices: Range<usize>) -> BlockPart<'_> {
+    fn part_mut(&mut self, slots: Range<usize>) -> BlockPart<'_, E> {
         BlockPart {
-            q: self.q.part_mut(slices.clone()),
-            s: self.s.as_mut().map(|a| a.part_mut(slices.clone())),
-            half_grad: self.half_grad.as_mut().map(|a| a.part_mut(slices.clone())),
-            wave: self.wave.part_mut(slices.clone()),
+            q: self.q.part_mut(slots.clone()),
+            s: self.s.as_mut().map(|a| a.part_mut(slots.clone())),
+            half_grad: self.half_grad.as_mut().map(|a| a.part_mut(slots.clone())),
+            wave: self.wave.part_mut(slots.clone()),
         }
     }
 
     /// All of it in slabs.
-    fn slabs_mut(&mut self) -> Vec<BlockPart<'_>> {
+    fn slabs_mut(&mut self) -> Vec<BlockPart<'_, E>> {
         let mut s = self.s.as_mut().map(|s| s.slabs_mut().into_iter());
         let mut half_grad = self.half_grad.as_mut().map(|h| h.slabs_mut().into_iter());
         std::iter::zip(self.q.slabs_mut(), self.wave.slabs_mut())
@@ -88,27 +91,27 @@ impl Block {
             .collect()
     }
 
-    /// Takes over slices of another block, to stand from `at` on.
-    fn copy_from(&mut self, other: &Self, slices: Range<usize>, at: usize) {
-        fn copy<const N: usize>(
-            to: &mut Array<N>,
-            from: &Array<N>,
-            slices: Range<usize>,
+    /// Takes over slots of another block, to stand from `at` on.
+    fn copy_from(&mut self, other: &Self, slots: Range<usize>, at: usize) {
+        fn copy<const N: usize, E: Real>(
+            to: &mut Array<N, E>,
+            from: &Array<N, E>,
+            slots: Range<usize>,
             at: usize,
         ) {
-            let to = to.part_mut(at..at + slices.len());
-            for (to, from) in std::iter::zip(to, from.part(slices)) {
+            let to = to.part_mut(at..at + slots.len());
+            for (to, from) in std::iter::zip(to, from.part(slots)) {
                 to.copy_from_slice(from);
             }
         }
-        copy(&mut self.q, &other.q, slices.clone(), at);
-        copy(&mut self.wave, &other.wave, slices.clone(), at);
+        copy(&mut self.q, &other.q, slots.clone(), at);
+        copy(&mut self.wave, &other.wave, slots.clone(), at);
         for (to, from) in [
             (&mut self.s, &other.s),
             (&mut self.half_grad, &other.half_grad),
         ] {
             if let (Some(to), Some(from)) = (to, from) {
-                copy(to, from, slices.clone(), at);
+                copy(to, from, slots.clone(), at);
             }
         }
     }
@@ -126,14 +129,15 @@ impl Block {
 
     /// Makes a slice what lies behind the body: numbers that a weight of 0 makes harmless.
     fn clear(&mut self, slice: usize) {
-        let part = self.part_mut(slice..slice + 1);
+        let part = self.part_mut(slice..slice + E::SLICE);
         let tensors = [Some(part.q), part.s, part.half_grad];
         tensors
             .into_iter()
             .flatten()
             .flatten()
-            .for_each(|c| c.fill(0.0));
-        part.wave.into_iter().for_each(|c| c.fill(1.0));
+            .for_each(|c| c.fill(E::nearest(0.0)));
+        let one = E::nearest(1.0);
+        part.wave.into_iter().for_each(|c| c.fill(one));
     }
 
     fn bytes(&self) -> usize {
@@ -147,25 +151,25 @@ impl Block {
     }
 }
 
-/// A block of the slices that a chunk's forces are about to need, as a ring: slice i stands at i modulo the capacity.
+/// A block of the slots that a chunk's forces are about to need, as a ring: slot i stands at i modulo the capacity.
 #[derive(Debug)]
-struct Window {
-    block: Block,
-    /// Slices, a power of two; behind them the first one stands once more, for reads across the end.
+struct Window<E: Real> {
+    block: Block<E>,
+    /// Slots, a power of two; behind them the first slice stands once more, for reads across the end.
     capacity: usize,
 }
 
-impl Window {
-    /// Writes slices, in tiles that the ring does not break: `write(block, slices, at)`.
-    fn write<E>(
+impl<E: Real> Window<E> {
+    /// Writes slots, in tiles that the ring does not break: `write(block, slots, at)`.
+    fn write<F>(
         &mut self,
-        slices: Range<usize>,
-        mut write: impl FnMut(&mut Block, Range<usize>, usize) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let mut start = slices.start;
-        while start < slices.end {
+        slots: Range<usize>,
+        mut write: impl FnMut(&mut Block<E>, Range<usize>, usize) -> Result<(), F>,
+    ) -> Result<(), F> {
+        let mut start = slots.start;
+        while start < slots.end {
             let at = start % self.capacity;
-            let end = slices.end.min(start + TILE.min(self.capacity - at));
+            let end = slots.end.min(start + TILE.min(self.capacity - at));
             write(&mut self.block, start..end, at)?;
             if at == 0 {
                 self.block.repeat_first(self.capacity);
@@ -178,13 +182,13 @@ impl Window {
 
 /// Where blocks are kept.
 #[derive(Debug)]
-enum Store {
+enum Store<E: Real> {
     /// Of the whole body at once, for passes over all neighbours that need them.
-    Whole(Block),
+    Whole(Block<E>),
     /// Of the head of each chunk; and of what is needed next, for each thread.
     Chunks {
-        heads: Vec<Block>,
-        windows: PerThread<Window>,
+        heads: Vec<Block<E>>,
+        windows: PerThread<Window<E>>,
     },
 }
 
@@ -199,32 +203,34 @@ pub(super) struct Needs {
 
 /// See the module's text.
 #[derive(Debug)]
-pub(super) struct Sweep {
+pub(super) struct Sweep<E: PairReal> {
     layout: Layout,
-    store: Store,
-    ends: Ends,
+    store: Store<E>,
+    ends: Ends<E>,
+    own: E::Own,
 }
 
 /// Sums over pairs, each computed once for both of its particles, in chunks: what a chunk's pairs do behind its end
 /// is kept apart and added afterwards.
 #[derive(Debug)]
-struct Ends {
+struct Ends<E: Real> {
     layout: Layout,
-    /// Slices of a chunk.
+    /// Slots of a chunk.
     each: usize,
-    /// Slices behind a chunk that its pairs reach, at most.
+    /// Slots behind a chunk that its pairs reach, at most.
     reach: usize,
     /// What is behind each chunk: components, one after the other.
-    behind: Vec<Slots>,
+    behind: Vec<E::Slots>,
 }
 
-impl Ends {
+impl<E: Real> Ends<E> {
     /// The sums in chunks, with those behind them.
-    fn chunks<'a>(&'a mut self, sums: &'a mut Array<3>) -> Vec<Sums<'a>> {
-        let behind = self.behind.chunks_mut(3 * self.reach).map(|all| {
+    fn chunks<'a>(&'a mut self, sums: &'a mut Array<3, E>) -> Vec<Sums<'a, E>> {
+        let behind: &mut [E] = bytemuck::cast_slice_mut(&mut self.behind);
+        let behind = behind.chunks_mut(3 * self.reach).map(|all| {
             let (x, rest) = all.split_at_mut(self.reach);
             let (y, z) = rest.split_at_mut(self.reach);
-            [x, y, z].map(bytemuck::must_cast_slice_mut)
+            [x, y, z]
         });
         std::iter::zip(sums.pieces_mut(self.each), behind)
             .map(|(out, behind)| Sums { out, behind })
@@ -234,8 +240,8 @@ impl Ends {
     /// Calls `work(run, sums)` for all chunks.
     fn pairs<R: Send>(
         &mut self,
-        sums: &mut Array<3>,
-        work: impl Fn((usize, usize), &mut Sums) -> R + Sync + Send,
+        sums: &mut Array<3, E>,
+        work: impl Fn((usize, usize), &mut Sums<E>) -> R + Sync + Send,
     ) -> Vec<R> {
         let (layout, each) = (self.layout, self.each);
         parallel::map_slabs(self.chunks(sums), |chunk, mut sums| {
@@ -245,36 +251,38 @@ impl Ends {
     }
 
     /// Adds what lies behind a chunk to the next one.
-    fn add(&mut self, sums: &mut Array<3>) {
+    fn add(&mut self, sums: &mut Array<3, E>) {
         let mut chunks = self.chunks(sums);
         let behind: Vec<_> = chunks
             .iter_mut()
             .map(|c| std::mem::take(&mut c.behind))
             .collect();
         let chunks = chunks.into_iter().skip(1).zip(behind).collect();
-        parallel::map_slabs(chunks, |_, (sums, before): (Sums, [&mut [f64]; 3])| {
+        parallel::map_slabs(chunks, |_, (sums, before): (Sums<E>, [&mut [E]; 3])| {
             for (sum, before) in sums.out.into_iter().zip(before) {
-                sum.iter_mut().zip(before).for_each(|(s, b)| *s += *b);
+                sum.iter_mut()
+                    .zip(before)
+                    .for_each(|(s, b)| *s = E::nearest(s.value() + b.value()));
             }
         });
     }
 }
 
 /// A chunk, and what was found of heads before.
-struct Chunk<'a> {
-    /// First slot, and slices.
+struct Chunk<'a, E: Real> {
+    /// First slot, and how many they are.
     range: (usize, usize),
-    /// Slices that pairs reach, at most.
+    /// Slots that pairs reach, at most.
     reach: usize,
-    /// Block and slices of its head and of the next one's, if it is not the last.
-    head: (&'a Block, usize),
-    next: Option<(&'a Block, usize)>,
+    /// Block and slots of its head and of the next one's, if it is not the last.
+    head: (&'a Block<E>, usize),
+    next: Option<(&'a Block<E>, usize)>,
 }
 
-impl Chunk<'_> {
-    /// Slices behind it that its pairs may reach.
+impl<E: Real> Chunk<'_, E> {
+    /// Slots behind it that its pairs may reach.
     fn behind(&self) -> usize {
-        self.next.map_or(0, |(_, slices)| slices)
+        self.next.map_or(0, |(_, slots)| slots)
     }
 }
 
@@ -286,7 +294,7 @@ pub(super) struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
-    /// In pieces of so many slices.
+    /// In pieces of so many slots.
     fn pieces(&mut self, each: usize) -> Vec<Kept<'_>> {
         let mut sigma_j = self
             .sigma_j
@@ -304,9 +312,136 @@ impl Outputs<'_> {
     }
 }
 
-/// The passes, with all that they have in common.
+/// A precision in which the pair passes run.
+pub trait PairReal: ReferenceReal {
+    /// What a body has of its own in this precision.
+    type Own: std::fmt::Debug + Send + Sync;
+    /// Of a body.
+    fn own(layout: Layout) -> Self::Own;
+    /// Takes over a new state.
+    fn take(own: &mut Self::Own, state: &State);
+    /// x and v.
+    fn motion<'a>(own: &'a Self::Own, state: &'a State) -> [[&'a [Self]; 3]; 2];
+    /// Where forces are summed, given where they are wanted, and x and v.
+    fn sums<'a>(
+        own: &'a mut Self::Own,
+        state: &'a State,
+        force: &'a mut Array<3>,
+    ) -> (&'a mut Array<3, Self>, [[&'a [Self]; 3]; 2]);
+    /// Hands the sums over.
+    fn hand_over(own: &Self::Own, force: &mut Array<3>);
+    /// Bytes held.
+    fn bytes(own: &Self::Own) -> usize;
+}
+
+/// The state itself.
+impl PairReal for f64 {
+    type Own = ();
+    fn own(_: Layout) {}
+    fn take((): &mut (), _: &State) {}
+    fn motion<'a>((): &'a (), state: &'a State) -> [[&'a [f64]; 3]; 2] {
+        [state.x.components(), state.v.components()]
+    }
+    fn sums<'a>(
+        (): &'a mut (),
+        state: &'a State,
+        force: &'a mut Array<3>,
+    ) -> (&'a mut Array<3>, [[&'a [f64]; 3]; 2]) {
+        (force, Self::motion(&(), state))
+    }
+    fn hand_over((): &(), _: &mut Array<3>) {}
+    fn bytes((): &()) -> usize {
+        0
+    }
+}
+
+/// Copies in single precision.
+#[derive(Debug)]
+pub struct Rounded {
+    /// x and v less those of a particle in the middle: the differences of neighbours, which are all that pairs
+    /// need, are then good to the round-off of the body's size and of the speeds within it.
+    x: Array<3, f32>,
+    v: Array<3, f32>,
+    force: Array<3, f32>,
+}
+
+impl PairReal for f32 {
+    type Own = Rounded;
+    fn own(layout: Layout) -> Rounded {
+        let zeros = || Array::new(layout, [0.0; 3]);
+        Rounded {
+            x: zeros(),
+            v: zeros(),
+            force: zeros(),
+        }
+    }
+    fn take(own: &mut Rounded, state: &State) {
+        let layout = state.x.layout();
+        let middle = Layout::slot(layout.particles / 2);
+        let (x, v) = (state.x.components(), state.v.components());
+        let origins = [state.x.get(middle), state.v.get(middle)];
+        let slabs = std::iter::zip(own.x.slabs_mut(), own.v.slabs_mut()).collect();
+        parallel::map_slabs(slabs, |slab, (to_x, to_v)| {
+            let run = layout.slab_range(slab);
+            for (from, origin, to) in [(x, origins[0], to_x), (v, origins[1], to_v)] {
+                vectorised(Round {
+                    from,
+                    origin,
+                    run,
+                    to,
+                });
+            }
+        });
+    }
+    fn motion<'a>(own: &'a Rounded, _: &'a State) -> [[&'a [f32]; 3]; 2] {
+        [own.x.components(), own.v.components()]
+    }
+    fn sums<'a>(
+        own: &'a mut Rounded,
+        _: &'a State,
+        _: &'a mut Array<3>,
+    ) -> (&'a mut Array<3, f32>, [[&'a [f32]; 3]; 2]) {
+        (&mut own.force, [own.x.components(), own.v.components()])
+    }
+    fn hand_over(own: &Rounded, force: &mut Array<3>) {
+        let (layout, from) = (force.layout(), own.force.components());
+        parallel::map_slabs(force.slabs_mut(), |slab, to| {
+            vectorised(Round {
+                from,
+                origin: [0.0; 3],
+                run: layout.slab_range(slab),
+                to,
+            });
+        });
+    }
+    fn bytes(own: &Rounded) -> usize {
+        own.x.bytes() + own.v.bytes() + own.force.bytes()
+    }
+}
+
+/// Copies vectors, less an origin, in another precision.
+struct Round<'a, E, F> {
+    from: [&'a [E]; 3],
+    origin: [f64; 3],
+    run: (usize, usize),
+    to: [&'a mut [F]; 3],
+}
+
+impl<E: Real, F: Real> Work for Round<'_, E, F> {
+    type Output = ();
+    #[inline(always)]
+    fn run<T: Precise>(mut self, token: T::Token) {
+        let origin = self.origin.map(|o| T::splat(token, o));
+        for (at, a) in lanes_from::<T>(self.run) {
+            let v = load3::<T>(token, &self.from, a);
+            store3(&sub3(v, origin), &mut self.to, at);
+        }
+    }
+}
+
+/// What is to be evaluated, and how.
 #[derive(Clone, Copy)]
-pub(super) struct Passes<'a> {
+pub(super) struct Task<'a> {
     pub law: Law,
     pub inputs: LawInputs<'a>,
     /// Whether the law maps its history.
@@ -322,32 +457,46 @@ pub(super) struct Passes<'a> {
     pub shock: f64,
 }
 
-impl Passes<'_> {
-    /// Gradient, law and point passes of a run of slices.
+/// The passes, with all that they have in common.
+#[derive(Clone, Copy)]
+struct Passes<'a, E: PairReal> {
+    task: Task<'a>,
+    slices: &'a Slices<E>,
+    /// x and v as pairs read them.
+    motion: [[&'a [E]; 3]; 2],
+}
+
+impl<E: PairReal> Passes<'_, E> {
+    /// What the force pass reads of a block.
+    fn input<'a>(&'a self, block: &'a Block<E>) -> ForceInput<'a, E> {
+        ForceInput::new(self.motion, self.task.reference, self.slices, block)
+    }
+
+    /// Gradient, law and point passes of a run of slots.
     fn points<R: Runner>(
         &self,
         run: (usize, usize),
-        mut out: PointOutput,
+        mut out: PointOutput<E>,
     ) -> Result<Evaluation, Breakdown> {
-        let Self { reference, .. } = *self;
-        let v = self.state.v.components();
-        with_pairs!(reference, pairs => R::run(Gradient {
-            pairs, reference, field: v, run, out: &mut out.kept.grad_v,
+        let Self { task, slices, .. } = *self;
+        let (reference, v) = (task.reference, task.state.v.components());
+        with_pairs!(E::pairs(reference).1, pairs => R::run_pairs::<E, _>(Gradient {
+            slices, pairs, reference, field: self.motion[1], run, out: &mut out.kept.grad_v,
         }));
-        let stored = with_law!(self.law, law => {
-            stresses::<R, _>(law, self.inputs, self.flow, run, &mut out)
+        let stored = with_law!(task.law, law => {
+            stresses::<R, _, E>(law, task.inputs, task.flow, run, &mut out)
         })?;
         let Motion { kinetic, length2 } = R::run(Points {
-            density: self.law.density(),
-            kinematics: self.inputs.kinematics,
+            density: task.law.density(),
+            kinematics: task.inputs.kinematics,
             reference,
             v,
-            spacing: self.spacing,
+            spacing: task.spacing,
             run,
             out: &mut out,
         })?;
-        if let (true, Some(half_grad)) = (self.limited, &mut out.block.half_grad) {
-            let x = self.state.x.components();
+        if let (true, Some(half_grad)) = (task.limited, &mut out.block.half_grad) {
+            let x = task.state.x.components();
             R::run(Limit {
                 reference,
                 x,
@@ -366,48 +515,49 @@ impl Passes<'_> {
         })
     }
 
-    /// The same of some slices of a chunk that begins in the slot `first`; in the block they stand from `at` on.
+    /// The same of some slots of a chunk that begins in the slot `first`; in the block they stand from `at` on.
     fn points_of_chunk<R: Runner>(
         &self,
         first: usize,
-        slices: Range<usize>,
+        slots: Range<usize>,
         kept: &mut Kept,
-        (block, at): (&mut Block, usize),
+        (block, at): (&mut Block<E>, usize),
     ) -> Result<Evaluation, Breakdown> {
-        let run = (first + slices.start * SLICE, slices.len());
+        let run = (first + slots.start, slots.len());
         let out = PointOutput {
-            block: block.part_mut(at..at + slices.len()),
-            kept: kept.part(slices),
+            block: block.part_mut(at..at + slots.len()),
+            kept: kept.part(slots),
         };
         self.points::<R>(run, out)
     }
 
-    /// Force pass of a run of slices that begins in a chunk at the place `from`.
+    /// Force pass of a run of slots that begins in a chunk at the place `from`.
     fn forces<R: Runner>(
         &self,
-        input: ForceInput,
+        input: ForceInput<E>,
         run: (usize, usize),
         from: usize,
-        sums: &mut Sums,
+        sums: &mut Sums<E>,
     ) -> Evaluation {
-        let Self {
+        let Task {
             speeds,
             coefficient,
             shock,
             mode,
             ..
-        } = *self;
+        } = self.task;
         macro_rules! forces {
             ($pairs:expr, $($mode:ident),*) => {
                 match mode {
-                    $(riemann::$mode => R::run(Forces::<_, { riemann::$mode }> {
+                    $(riemann::$mode => R::run_pairs::<E, _>(Forces::<_, E, { riemann::$mode }> {
                         pairs: $pairs, input, speeds, coefficient, shock, run, from, sums,
                     }),)*
                     _ => unreachable!("six modes"),
                 }
             };
         }
-        let (dissipation, length) = with_pairs!(self.reference, pairs => forces!(
+        let (_, pairs) = E::pairs(self.task.reference);
+        let (dissipation, length) = with_pairs!(pairs, pairs => forces!(
             pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF, GUARDED
         ));
         Evaluation {
@@ -420,58 +570,57 @@ impl Passes<'_> {
     /// All passes of a chunk but the point pass of its head, which was made before, as that of the next one's was.
     fn chunk<R: Runner>(
         &self,
-        chunk: &Chunk,
-        window: &mut Window,
-        (mut kept, mut sums): (Kept, Sums),
+        chunk: &Chunk<E>,
+        window: &mut Window<E>,
+        (mut kept, mut sums): (Kept, Sums<E>),
     ) -> Result<Evaluation, Breakdown> {
         sums.clear();
-        let (first, slices) = chunk.range;
+        let (first, slots) = chunk.range;
         let mut total = Evaluation::NONE;
         let mut ready = 0;
-        for start in (0..slices).step_by(TILE) {
-            let end = slices.min(start + TILE);
-            let needed = (end + chunk.reach).min(slices + chunk.behind());
+        for start in (0..slots).step_by(TILE) {
+            let end = slots.min(start + TILE);
+            let needed = (end + chunk.reach).min(slots + chunk.behind());
             total.add(&self.fill::<R>(chunk, ready..needed, window, &mut kept)?);
             ready = needed;
-            let input = ForceInput::new(self.state, self.reference, &window.block)
-                .in_ring(first, window.capacity);
-            let (from, run) = (start * SLICE, (first + start * SLICE, end - start));
-            total.add(&self.forces::<R>(input, run, from, &mut sums));
+            let input = self.input(&window.block).in_ring(first, window.capacity);
+            let run = (first + start, end - start);
+            total.add(&self.forces::<R>(input, run, start, &mut sums));
         }
         Ok(total)
     }
 
-    /// Brings slices of a chunk, and behind it, into the window.
+    /// Brings slots of a chunk, and behind it, into the window.
     fn fill<R: Runner>(
         &self,
-        chunk: &Chunk,
-        slices: Range<usize>,
-        window: &mut Window,
+        chunk: &Chunk<E>,
+        slots: Range<usize>,
+        window: &mut Window<E>,
         kept: &mut Kept,
     ) -> Result<Evaluation, Breakdown> {
         let (first, count) = chunk.range;
         let within =
-            |from: usize, to: usize| slices.start.clamp(from, to)..slices.end.clamp(from, to);
+            |from: usize, to: usize| slots.start.clamp(from, to)..slots.end.clamp(from, to);
         let mut total = Evaluation::NONE;
         let head = within(0, chunk.head.1);
-        window.write(head, |block, slices, at| {
-            block.copy_from(chunk.head.0, slices, at);
+        window.write(head, |block, slots, at| {
+            block.copy_from(chunk.head.0, slots, at);
             Ok(())
         })?;
-        window.write(within(chunk.head.1, count), |block, slices, at| {
-            total.add(&self.points_of_chunk::<R>(first, slices, kept, (block, at))?);
+        window.write(within(chunk.head.1, count), |block, slots, at| {
+            total.add(&self.points_of_chunk::<R>(first, slots, kept, (block, at))?);
             Ok(())
         })?;
         let last = count + chunk.behind();
         if let Some((next, _)) = chunk.next {
-            window.write(within(count, last), |block, slices, at| {
-                let slices = slices.start - count..slices.end - count;
-                block.copy_from(next, slices, at);
+            window.write(within(count, last), |block, slots, at| {
+                let slots = slots.start - count..slots.end - count;
+                block.copy_from(next, slots, at);
                 Ok(())
             })?;
         }
-        if slices.end == last && !slices.is_empty() {
-            window.write(last..last + 1, |block, _, at| {
+        if slots.end == last && !slots.is_empty() {
+            window.write(last..last + E::SLICE, |block, _, at| {
                 block.clear(at);
                 Ok(())
             })?;
@@ -484,16 +633,13 @@ impl Passes<'_> {
     fn bound<R: Runner, P: PairVectors>(
         &self,
         pairs: P,
-        block: &mut Block,
-        ends: &mut Ends,
-        sums: &mut Array<3>,
+        block: &mut Block<E>,
+        ends: &mut Ends<E>,
+        sums: &mut Array<3, E>,
     ) {
-        let (input, speeds) = (
-            ForceInput::new(self.state, self.reference, block),
-            self.speeds,
-        );
+        let (input, speeds) = (self.input(block), self.task.speeds);
         ends.pairs(sums, |run, sums| {
-            R::run(Dissipated {
+            R::run_pairs::<E, _>(Dissipated {
                 pairs,
                 input,
                 speeds,
@@ -502,11 +648,11 @@ impl Passes<'_> {
             });
         });
         ends.add(sums);
-        let (sums, layout) = (sums.components(), self.reference.layout);
+        let (sums, layout) = (sums.components(), self.task.reference.layout);
         if let Some(half_grad) = &mut block.half_grad {
             parallel::map_slabs(half_grad.slabs_mut(), |slab, half_grad| {
                 let run = layout.slab_range(slab);
-                R::run(Bound {
+                R::run_pairs::<E, _>(Bound {
                     sums,
                     run,
                     half_grad,
@@ -516,22 +662,15 @@ impl Passes<'_> {
     }
 }
 
-impl Sweep {
+impl<E: PairReal> Sweep<E> {
     /// Of a body.
     pub fn new(reference: &Reference, needs: Needs) -> Self {
         let layout = reference.layout;
-        let reach = reference.slices.reach().max(1);
-        let reaches = (layout.slices / (CHUNKS * reach)).clamp(REACHES.0, REACHES.1);
+        let reach = E::pairs(reference).0.reach().max(E::SLICE);
+        let reaches = (layout.slots / (CHUNKS * reach)).clamp(REACHES.0, REACHES.1);
         let each = (reaches * reach).max(layout.slab);
-        let block = |slices: usize| {
-            let layout = Layout {
-                particles: slices * SLICE,
-                slices,
-                slab: layout.slab,
-            };
-            Block::new(layout, needs.areas, needs.gradients)
-        };
-        let chunks = layout.slices.div_ceil(each);
+        let block = |slots: usize| Block::new(Layout::new(slots), needs.areas, needs.gradients);
+        let chunks = layout.slots.div_ceil(each);
         let store = if needs.whole {
             Store::Whole(Block::new(layout, needs.areas, needs.gradients))
         } else {
@@ -539,9 +678,9 @@ impl Sweep {
                 heads: (0..chunks).map(|_| block(reach)).collect(),
                 windows: PerThread::new(|| {
                     // One more for what lies behind the body.
-                    let capacity = (TILE + reach + 1).next_power_of_two();
+                    let capacity = (TILE + reach + E::SLICE).next_power_of_two();
                     Window {
-                        block: block(capacity + 1),
+                        block: block(capacity + E::SLICE),
                         capacity,
                     }
                 }),
@@ -554,34 +693,53 @@ impl Sweep {
                 layout,
                 each,
                 reach,
-                behind: vec![Slots([0.0; SLICE]); chunks * 3 * reach],
+                behind: vec![E::slots(0.0); chunks * 3 * reach / E::SLICE],
             },
+            own: E::own(layout),
         }
     }
 
-    /// The block of the whole body, where it is kept.
-    pub fn whole(&self) -> Option<&Block> {
-        match &self.store {
-            Store::Whole(block) => Some(block),
-            Store::Chunks { .. } => None,
-        }
+    /// What passes over all neighbours read of the last evaluation, whose state is given.
+    ///
+    /// # Panics
+    /// Where such passes were not asked for.
+    pub fn input<'a>(
+        &'a self,
+        state: &'a State,
+        reference: &'a Reference,
+    ) -> ForceInput<'a, E> {
+        let Store::Whole(block) = &self.store else {
+            unreachable!("the block of the whole body is kept for them");
+        };
+        let (slices, _) = E::pairs(reference);
+        ForceInput::new(E::motion(&self.own, state), reference, slices, block)
     }
 
     /// Number of chunks.
     #[cfg(test)]
     pub fn chunks(&self) -> usize {
-        self.layout.slices.div_ceil(self.ends.each)
+        self.layout.slots.div_ceil(self.ends.each)
     }
 
     /// All passes over the body; the length is still squared.
     pub fn run<R: Runner>(
         &mut self,
-        passes: Passes,
+        task: Task,
         mut out: Outputs,
         force: &mut Array<3>,
     ) -> Result<Evaluation, Breakdown> {
-        let Self { layout, ends, .. } = self;
+        let Self {
+            layout, ends, own, ..
+        } = self;
         let (layout, each, reach) = (*layout, ends.each, ends.reach);
+        E::take(own, task.state);
+        let (sums, motion) = E::sums(own, task.state, force);
+        let (slices, pairs) = E::pairs(task.reference);
+        let passes = Passes {
+            task,
+            slices,
+            motion,
+        };
         let total = match &mut self.store {
             Store::Whole(block) => {
                 let slabs = std::iter::zip(out.pieces(layout.slab), block.slabs_mut());
@@ -590,31 +748,29 @@ impl Sweep {
                     passes.points::<R>(run, PointOutput { kept, block })
                 });
                 let points = Evaluation::sum(points)?;
-                if let (Pairs::Closed(pairs), Some(_)) =
-                    (passes.reference.pair_vectors(), &block.half_grad)
-                {
-                    passes.bound::<R, _>(pairs, block, ends, force);
+                if let (Pairs::Closed(pairs), Some(_)) = (pairs, &block.half_grad) {
+                    passes.bound::<R, _>(pairs, block, ends, sums);
                 }
-                let input = ForceInput::new(passes.state, passes.reference, block);
-                let forces = ends.pairs(force, |run, sums| passes.forces::<R>(input, run, 0, sums));
+                let input = passes.input(block);
+                let forces = ends.pairs(sums, |run, sums| passes.forces::<R>(input, run, 0, sums));
                 Evaluation::sum([points].into_iter().chain(forces).map(Ok))?
             }
             Store::Chunks { heads, windows } => {
                 let chunks = std::iter::zip(out.pieces(each), &mut *heads).collect();
                 let points = parallel::map_slabs(chunks, |chunk, (mut kept, head)| {
-                    let (first, slices) = layout.piece_range(chunk, each);
-                    let starts = (0..slices.min(reach)).step_by(TILE);
+                    let (first, slots) = layout.piece_range(chunk, each);
+                    let starts = (0..slots.min(reach)).step_by(TILE);
                     Evaluation::sum(starts.map(|start| {
-                        let tile = start..slices.min(reach).min(start + TILE);
+                        let tile = start..slots.min(reach).min(start + TILE);
                         passes.points_of_chunk::<R>(first, tile, &mut kept, (&mut *head, start))
                     }))
                 });
                 let points = Evaluation::sum(points)?;
-                let chunks = std::iter::zip(out.pieces(each), ends.chunks(force));
+                let chunks = std::iter::zip(out.pieces(each), ends.chunks(sums));
                 let heads = &*heads;
                 let head = |chunk: usize| {
-                    let (_, slices) = layout.piece_range(chunk, each);
-                    (&heads[chunk], slices.min(reach))
+                    let (_, slots) = layout.piece_range(chunk, each);
+                    (&heads[chunk], slots.min(reach))
                 };
                 let chunks = windows.map(chunks.collect(), |window, index, outputs| {
                     let chunk = Chunk {
@@ -628,7 +784,8 @@ impl Sweep {
                 Evaluation::sum([Ok(points)].into_iter().chain(chunks))?
             }
         };
-        ends.add(force);
+        ends.add(sums);
+        E::hand_over(own, force);
         Ok(total)
     }
 
@@ -641,6 +798,6 @@ impl Sweep {
                     + windows.sum(|window| window.block.bytes())
             }
         };
-        blocks + std::mem::size_of_val(&self.ends.behind[..])
+        blocks + std::mem::size_of_val(&self.ends.behind[..]) + E::bytes(&self.own)
     }
 }

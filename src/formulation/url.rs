@@ -14,18 +14,18 @@ use super::advance::{Advance, StateSlab};
 use super::conduction::Conduction;
 use super::laws::{LawInputs, inadmissible};
 use super::passes::{
-    AreaLengths, BoundSlope, ForceInput, Gradient, HalfSlope, Kinematics, VolumeRates, immovable,
+    AreaLengths, BoundSlope, Gradient, HalfSlope, Kinematics, VolumeRates, immovable,
     spacings,
 };
 use super::riemann::{self, WaveSpeeds};
-use super::sweep::{Needs, Outputs, Passes, Sweep};
-use crate::lane::{Lane, SLICE, Work, vectorised};
+use super::sweep::{Needs, Outputs, Sweep, Task};
+use crate::lane::{Lane, PairWork, Real, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::material::{Deformation, History, Law, Material, Point, Thermal, VIRGIN, with_law};
 use crate::math::*;
 use crate::parallel;
 use crate::reference::{Pairs, Reference, load3, store9, with_pairs};
-use crate::scene::{Limiter, Numerics, Reconstruction, StateMeasures};
+use crate::scene::{Limiter, Numerics, Precision, Reconstruction, StateMeasures};
 
 pub use super::laws::Plastic;
 
@@ -138,6 +138,8 @@ pub struct Breakdown {
 
 /// Share of the kinetic energy that round-off may make of D^p while a wave runs to a neighbour.
 const ROUND_OFF: f64 = 1e-12;
+/// The same in single precision: a spinning block of 1000 particles makes 1e-9.
+const ROUND_OFF_SINGLE: f64 = 1e-8;
 
 /// What a solution breaks down of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,6 +164,23 @@ pub struct Narrowest {
     pub pair: Option<(usize, f64, f64)>,
 }
 
+/// The sweep in the scene's precision.
+#[derive(Debug)]
+enum Sweeps {
+    Double(Sweep<f64>),
+    Single(Sweep<f32>),
+}
+
+/// Runs an expression with the sweep bound to a name.
+macro_rules! with_sweep {
+    ($sweeps:expr, $name:ident => $body:expr) => {
+        match $sweeps {
+            Sweeps::Double($name) => $body,
+            Sweeps::Single($name) => $body,
+        }
+    };
+}
+
 /// What the scene asks of the formulation, resolved to what the loops branch on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Options {
@@ -179,7 +198,7 @@ pub struct Url {
     law: Law,
     pub(super) options: Options,
     pub(super) scratch: Scratch,
-    sweep: Sweep,
+    sweep: Sweeps,
     conduction: Option<Conduction>,
     /// Spacing tensors [m^-2], initial; only of a law that flows, with kernels on a lattice. Elsewhere
     /// the stretch of the law or the areas of the pairs see to the same.
@@ -264,7 +283,11 @@ impl Url {
         let volume = numerics.volume_dissipation > 0.0;
         let conduction = thermal.filter(|t| t.conductivity > 0.0);
         let bound = reference.is_bound_by_areas();
-        let areas = mode != riemann::OFF || volume || bound || conduction.is_some();
+        let needs = Needs {
+            areas: mode != riemann::OFF || volume || bound || conduction.is_some(),
+            gradients: riemann::reconstructs(mode),
+            whole: volume || bound || conduction.is_some(),
+        };
         Self {
             law,
             options: Options {
@@ -279,14 +302,10 @@ impl Url {
                 sigma_j: volume.then(|| (Array::new(layout, [0.0]), Array::new(layout, [0.0; 3]))),
                 theta: thermal.map(|_| Array::new(layout, [1.0; 2])),
             },
-            sweep: Sweep::new(
-                reference,
-                Needs {
-                    areas,
-                    gradients: riemann::reconstructs(mode),
-                    whole: volume || bound || conduction.is_some(),
-                },
-            ),
+            sweep: match numerics.precision {
+                Precision::Double => Sweeps::Double(Sweep::new(reference, needs)),
+                Precision::Single => Sweeps::Single(Sweep::new(reference, needs)),
+            },
             conduction: conduction.map(|thermal| Conduction::new(layout, thermal)),
             spacing: (law.has_history() && !bound).then(|| spacings(reference)),
             rates: Rates {
@@ -361,7 +380,11 @@ impl Url {
         // the others lose. Where all of them together gain, flow varies beyond what gradients
         // can follow: then nothing is left to those that gain.
         let gain = -total.dissipation * total.length;
-        let round_off = ROUND_OFF * total.kinetic * self.wave_speeds().pressure;
+        let round_off = match self.sweep {
+            Sweeps::Double(_) => ROUND_OFF,
+            Sweeps::Single(_) => ROUND_OFF_SINGLE,
+        };
+        let round_off = round_off * total.kinetic * self.wave_speeds().pressure;
         if matches!(mode, riemann::LINEAR | riemann::SHOCK) && gain > round_off {
             let guarded = self.sweep::<R>(state, reference, elapsed, riemann::GUARDED)?;
             total.dissipation = guarded.dissipation;
@@ -370,16 +393,13 @@ impl Url {
             total.dissipation += self.volume_rates::<R>(state, reference);
         }
         if let Some(heat) = &mut self.rates.heat {
-            match (
-                &mut self.conduction,
-                &self.scratch.theta,
-                self.sweep.whole(),
-            ) {
-                (Some(conduction), Some(theta), Some(block)) => {
-                    let input = ForceInput::new(state, reference, block);
+            match (&mut self.conduction, &self.scratch.theta) {
+                (Some(conduction), Some(theta)) => {
                     let kinematics = Kinematics::new(state, reference);
-                    (total.conduction, total.conduction_step) =
-                        conduction.rates::<R>(&input, &kinematics, theta, heat);
+                    (total.conduction, total.conduction_step) = with_sweep!(&self.sweep, sweep => {
+                        let input = sweep.input(state, reference);
+                        conduction.rates::<R>(&input, &kinematics, theta, heat)
+                    });
                 }
                 _ => heat.fill(0.0),
             }
@@ -395,14 +415,12 @@ impl Url {
     /// Sees to it that the steps of conduction are stable, from the evaluation of a body's first state; the
     /// rates have to be evaluated again.
     pub fn calibrate_conduction(&mut self, state: &State, reference: &Reference) {
-        if let (Some(conduction), Some(heat), Some(block)) = (
-            &mut self.conduction,
-            &mut self.rates.heat,
-            self.sweep.whole(),
-        ) {
-            let input = ForceInput::new(state, reference, block);
+        if let (Some(conduction), Some(heat)) = (&mut self.conduction, &mut self.rates.heat) {
             let kinematics = Kinematics::new(state, reference);
-            conduction.calibrate::<Vectors>(&input, &kinematics, heat);
+            with_sweep!(&self.sweep, sweep => {
+                let input = sweep.input(state, reference);
+                conduction.calibrate::<Vectors>(&input, &kinematics, heat);
+            });
         }
     }
 
@@ -432,7 +450,7 @@ impl Url {
             history: state.history.as_ref().map(Array::components),
             elapsed: elapsed.unwrap_or(0.0),
         };
-        let passes = Passes {
+        let task = Task {
             law: *law,
             inputs,
             flow: elapsed.is_some(),
@@ -453,21 +471,20 @@ impl Url {
             sigma_j: scratch.sigma_j.as_mut().map(|(sigma_j, _)| sigma_j),
             theta: scratch.theta.as_mut(),
         };
-        sweep.run::<R>(passes, outputs, &mut rates.force)
+        with_sweep!(sweep, sweep => sweep.run::<R>(task, outputs, &mut rates.force))
     }
 
     /// Smallest squared length that the areas of the pairs allow.
     fn area_length2<R: Runner>(&self, state: &State, reference: &Reference) -> f64 {
-        let Some(block) = self.sweep.whole() else {
-            return f64::INFINITY;
-        };
-        let input = ForceInput::new(state, reference, block);
         let density = self.law.density();
         let slabs = vec![(); reference.layout.slabs()];
-        let found = parallel::map_slabs(
-            slabs,
-            |slab, ()| with_pairs!(reference, pairs => R::run(AreaLengths { pairs, input, density, slab })),
-        );
+        let found = with_sweep!(&self.sweep, sweep => {
+            let input = sweep.input(state, reference);
+            parallel::map_slabs(slabs, |slab, ()| with_pairs!(
+                reference.pair_vectors(),
+                pairs => R::run(AreaLengths { pairs, input, density, slab })
+            ))
+        });
         found.into_iter().fold(f64::INFINITY, f64::min)
     }
 
@@ -481,43 +498,41 @@ impl Url {
             rates,
             ..
         } = self;
-        let (Some((sigma_j, mut half_slope)), Some(out), Some(block)) = (
-            scratch.sigma_j.take(),
-            rates.j_dissipation.as_mut(),
-            sweep.whole(),
-        ) else {
+        let (Some((sigma_j, mut half_slope)), Some(out)) =
+            (scratch.sigma_j.take(), rates.j_dissipation.as_mut())
+        else {
             return 0.0;
         };
         let sigma = sigma_j.components()[0];
         let kinematics = Kinematics::new(state, reference);
         if options.linear {
             parallel::map_slabs(half_slope.slabs_mut(), |slab, out| {
-                with_pairs!(reference, pairs => R::run(HalfSlope {
+                with_pairs!(reference.pair_vectors(), pairs => R::run(HalfSlope {
                     pairs, reference, kinematics, field: sigma, slab, out,
                 }));
             });
         }
-        let input = ForceInput::new(state, reference, block);
-        if options.linear
-            && let Pairs::Closed(pairs) = reference.pair_vectors()
-        {
-            parallel::map_slabs(half_slope.slabs_mut(), |slab, half_slope| {
-                R::run(BoundSlope {
-                    pairs,
-                    input,
-                    sigma,
-                    pressure_speed,
-                    slab,
-                    half_slope,
-                });
-            });
-        }
-        let (slope, j_chi) = (half_slope.components(), kinematics.j_chi);
         let coefficient = options.volume_dissipation;
-        let powers = parallel::map_slabs(out.slabs_mut(), |slab, [out]| {
-            with_pairs!(reference, pairs => R::run(VolumeRates {
-                pairs, input, sigma, slope, j_chi, pressure_speed, coefficient, slab, out,
-            }))
+        let powers = with_sweep!(sweep, sweep => {
+            let input = sweep.input(state, reference);
+            if let (true, Pairs::Closed(pairs)) = (options.linear, reference.pair_vectors()) {
+                parallel::map_slabs(half_slope.slabs_mut(), |slab, half_slope| {
+                    R::run(BoundSlope {
+                        pairs,
+                        input,
+                        sigma,
+                        pressure_speed,
+                        slab,
+                        half_slope,
+                    });
+                });
+            }
+            let (slope, j_chi) = (half_slope.components(), kinematics.j_chi);
+            parallel::map_slabs(out.slabs_mut(), |slab, [out]| {
+                with_pairs!(reference.pair_vectors(), pairs => R::run(VolumeRates {
+                    pairs, input, sigma, slope, j_chi, pressure_speed, coefficient, slab, out,
+                }))
+            })
         });
         scratch.sigma_j = Some((sigma_j, half_slope));
         powers.iter().sum()
@@ -614,9 +629,9 @@ impl Url {
             .map(|(f_chi, [j_chi])| (f_chi, j_chi, h_chi.as_mut().and_then(Iterator::next)))
             .collect();
         let found = parallel::map_slabs(slabs, |slab, (mut f_chi, j_chi, mut h_chi)| {
-            let (first, slices) = layout.slab_range(slab);
+            let (first, slots) = layout.slab_range(slab);
             let mut breakdown = None;
-            for at in 0..slices * SLICE {
+            for at in 0..slots {
                 let total = kinematics.total::<f64>((), first + at);
                 store9(&total.f, &mut f_chi, at);
                 total.j.store(j_chi, at);
@@ -713,7 +728,7 @@ impl Url {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let s = &self.scratch;
-        self.sweep.bytes()
+        with_sweep!(&self.sweep, sweep => sweep.bytes())
             + s.sigma_j.as_ref().map_or(0, |(a, b)| a.bytes() + b.bytes())
             + self.rates.force.bytes()
             + self.rates.grad_v.bytes()
@@ -728,6 +743,7 @@ impl Url {
 /// How the passes run: on vectors, or in the tests one particle at a time as the readable form.
 pub(super) trait Runner {
     fn run<W: Work>(work: W) -> W::Output;
+    fn run_pairs<E: Real, W: PairWork>(work: W) -> W::Output;
 }
 
 struct Vectors;
@@ -735,6 +751,9 @@ struct Vectors;
 impl Runner for Vectors {
     fn run<W: Work>(work: W) -> W::Output {
         vectorised(work)
+    }
+    fn run_pairs<E: Real, W: PairWork>(work: W) -> W::Output {
+        E::vectorised(work)
     }
 }
 
@@ -746,8 +765,8 @@ pub fn deform(state: &mut State, reference: &Reference) {
     let mut f = Array::new(layout, flat(&IDENTITY));
     parallel::map_slabs(f.slabs_mut(), |slab, mut out| {
         let run = layout.slab_range(slab);
-        with_pairs!(reference, pairs => vectorised(Gradient {
-            pairs, reference, field: x, run, out: &mut out,
+        with_pairs!(reference.pair_vectors(), pairs => f64::vectorised(Gradient {
+            slices: &reference.slices, pairs, reference, field: x, run, out: &mut out,
         }));
     });
     for slot in (0..layout.particles).map(Layout::slot) {
@@ -770,6 +789,9 @@ mod tests {
         fn run<W: Work>(work: W) -> W::Output {
             work.run::<f64>(())
         }
+        fn run_pairs<E: Real, W: PairWork>(work: W) -> W::Output {
+            E::one_by_one(work)
+        }
     }
 
     /// The narrower vectors, where the processor has the widest.
@@ -780,6 +802,9 @@ mod tests {
     impl Runner for Avx2 {
         fn run<W: Work>(work: W) -> W::Output {
             crate::lane::on_avx2(work).expect("checked by the test")
+        }
+        fn run_pairs<E: Real, W: PairWork>(work: W) -> W::Output {
+            E::on_avx2(work).expect("checked by the test")
         }
     }
 

@@ -1,7 +1,7 @@
 //! Hencky's elasticity with von Mises flow: [URL23] 31 to 39 and Algorithm 1, [URL22] remark 3.
 
 use super::{Deformation, History, Material, Moduli, Stress};
-use crate::lane::Lane;
+use crate::lane::Precise;
 use crate::math::*;
 
 /// W = mu dev(e):dev(e) + kappa/2 (ln J)^2 with e = 1/2 ln b_e, b_e = F C_p^-1 F^T, and a yield
@@ -43,7 +43,7 @@ pub struct Flow<T> {
     pub work: T,
 }
 
-impl<T: Lane> Flow<T> {
+impl<T: Precise> Flow<T> {
     /// No flow.
     #[inline(always)]
     pub fn none(token: T::Token) -> Self {
@@ -63,7 +63,7 @@ pub trait Yield: Copy + Send + Sync {
     /// The plastic work is that of the mean of the hardening at start and end: along a path on the
     /// surface the work done is the integral of tau_y, for which this is the trapezoidal rule; it is
     /// exact for linear hardening, and for an increment that begins below the surface too.
-    fn flow<T: Lane>(&self, trial: &Trial<T>) -> Flow<T>;
+    fn flow<T: Precise>(&self, trial: &Trial<T>) -> Flow<T>;
 }
 
 impl<Y: Yield> Material for Hencky<Y> {
@@ -79,7 +79,7 @@ impl<Y: Yield> Material for Hencky<Y> {
     }
     /// [URL23] Algorithm 1 without its spectral decomposition.
     #[inline(always)]
-    fn stress<T: Lane, const FLOW: bool>(
+    fn stress<T: Precise, const FLOW: bool>(
         &self,
         d: &Deformation<T>,
         theta: T,
@@ -533,7 +533,7 @@ pub(super) mod tests {
     impl<M: Material> Work for Points<'_, M> {
         type Output = ();
         #[inline(always)]
-        fn run<T: Lane>(self, token: T::Token) {
+        fn run<T: Precise>(self, token: T::Token) {
             for at in (0..self.1.len()).step_by(T::WIDTH) {
                 let mut column = [0.0; SLICE];
                 let x: [T; 17] = std::array::from_fn(|k| {

@@ -1,7 +1,7 @@
 //! Rate- and temperature-dependent plasticity of Johnson and Cook: [URL23] 41 and 42.
 
 use super::hencky::{Flow, Trial, Yield};
-use crate::lane::Lane;
+use crate::lane::Precise;
 
 /// tau_y = (tau_0 + H e^N) [1 + C ln(rate/rate_0)] (1 - g^M), g = (theta - theta_transition)/(theta_melt -
 /// theta_transition) in [0, 1], of the equivalent plastic strain e.
@@ -46,7 +46,7 @@ impl JohnsonCook {
 
     /// 1 - g^M ([URL23] 42).
     #[inline(always)]
-    fn softening<T: Lane>(&self, theta: T) -> T {
+    fn softening<T: Precise>(&self, theta: T) -> T {
         let one = theta.of(1.0);
         let above = theta - theta.of(self.transition_temperature);
         if !above.any_positive() {
@@ -59,7 +59,7 @@ impl JohnsonCook {
 
     /// tau_0 + H e^N, and H e^N by itself.
     #[inline(always)]
-    fn hardening<T: Lane>(&self, strain: T) -> (T, T) {
+    fn hardening<T: Precise>(&self, strain: T) -> (T, T) {
         let hardening = if self.hardening_modulus > 0.0 {
             strain.powf(self.hardening_exponent) * strain.of(self.hardening_modulus)
         } else {
@@ -78,7 +78,7 @@ impl Yield for JohnsonCook {
     /// concave. The start x = (q - tau_y(e, 0))/(3 mu) is not below the root: from there the iterates
     /// fall to it without passing it. Where the rate prevails R is a line, and one step does.
     #[inline(always)]
-    fn flow<T: Lane>(&self, trial: &Trial<T>) -> Flow<T> {
+    fn flow<T: Precise>(&self, trial: &Trial<T>) -> Flow<T> {
         // Round-off of R is a few units of q's; a step below it would not end.
         const TOLERANCE: f64 = 1e-14;
         let Trial {

@@ -1,7 +1,7 @@
 //! Linear elasticity, for comparison with the exact solutions of small strains ([URL23] 7.1, 7.2).
 
 use super::{Deformation, History, Material, Moduli, Stress};
-use crate::lane::Lane;
+use crate::lane::Precise;
 use crate::math::*;
 
 /// W = mu e:e + lambda/2 tr(e)^2 with e = sym(F - I); it knows no rotation.
@@ -21,7 +21,7 @@ impl Material for LinearElastic {
     }
     /// P = 2 mu e + lambda tr(e) I.
     #[inline(always)]
-    fn stress<T: Lane, const FLOW: bool>(
+    fn stress<T: Precise, const FLOW: bool>(
         &self,
         d: &Deformation<T>,
         _: T,

@@ -16,7 +16,7 @@ pub use neo_hookean::NeoHookean;
 pub use thermal::Thermal;
 pub use von_mises::VonMises;
 
-use crate::lane::Lane;
+use crate::lane::Precise;
 use crate::math::{Mat3, cofactor, dot, largest_eigenvalue, mat_mul_t, scale9};
 
 /// History of one particle: the inverse plastic right Cauchy-Green tensor C_p^-1 (initial
@@ -44,7 +44,7 @@ pub trait Material: Copy + Send + Sync {
     /// With `FLOW` the history, which holds that of the step's start, is mapped to the end of
     /// `elapsed` [s] at the temperature `theta` [K]; without it the history is frozen and the
     /// response elastic.
-    fn stress<T: Lane, const FLOW: bool>(
+    fn stress<T: Precise, const FLOW: bool>(
         &self,
         d: &Deformation<T>,
         theta: T,
@@ -56,7 +56,7 @@ pub trait Material: Copy + Send + Sync {
 /// Smallest stretch of F: 1/lambda^2 is the largest eigenvalue of F^-T F^-1. A hyperelastic body's
 /// fastest wave crosses a pair as if the pair were shorter by this factor ([URL22] 63).
 #[inline(always)]
-fn smallest_stretch<T: Lane>(f: &Mat3<T>) -> T {
+fn smallest_stretch<T: Precise>(f: &Mat3<T>) -> T {
     let cof = cofactor(f);
     dot(f[0], cof[0]) / largest_eigenvalue(&mat_mul_t(&cof, &cof)).sqrt()
 }

@@ -1,7 +1,7 @@
 //! Mooney-Rivlin law of [URL22] eqs. 5 to 8.
 
 use super::{Deformation, History, Material, Moduli, Stress, smallest_stretch};
-use crate::lane::Lane;
+use crate::lane::Precise;
 use crate::math::*;
 
 /// W = zeta J^(-2/3) F:F + xi J^-2 (H:H)^(3/2) - 3 (zeta + sqrt(3) xi) + kappa/2 (J - 1)^2,
@@ -36,7 +36,7 @@ impl Material for MooneyRivlin {
     }
     /// [URL22] eqs. 5 to 8.
     #[inline(always)]
-    fn stress<T: Lane, const FLOW: bool>(
+    fn stress<T: Precise, const FLOW: bool>(
         &self,
         d: &Deformation<T>,
         _: T,

@@ -1,7 +1,7 @@
 //! Neo-Hookean law: [URL22] eq. 5 with zeta = mu/2, xi = 0.
 
 use super::{Deformation, History, Material, Moduli, Stress, smallest_stretch};
-use crate::lane::Lane;
+use crate::lane::Precise;
 use crate::math::*;
 
 /// W = mu/2 (J^(-2/3) F:F - 3) + kappa/2 (J - 1)^2.
@@ -20,7 +20,7 @@ impl Material for NeoHookean {
     }
     /// [URL22] eqs. 5 to 8.
     #[inline(always)]
-    fn stress<T: Lane, const FLOW: bool>(
+    fn stress<T: Precise, const FLOW: bool>(
         &self,
         d: &Deformation<T>,
         _: T,

@@ -2,7 +2,7 @@
 //! and volume, thermal pressure, thermal energy.
 
 use super::{Deformation, Law, Stress};
-use crate::lane::Lane;
+use crate::lane::{Lane, Precise};
 use crate::math::*;
 use crate::scene::Heat;
 
@@ -76,7 +76,7 @@ impl Thermal {
 
     /// J^q and J^(q-1).
     #[inline(always)]
-    fn powers<T: Lane>(&self, j: T) -> (T, T) {
+    fn powers<T: Precise>(&self, j: T) -> (T, T) {
         let one = j.of(1.0);
         if self.q == 1.0 {
             (j, one)
@@ -91,7 +91,7 @@ impl Thermal {
     /// Entropy at the reference temperature over c_v, and J^(q-1): Gamma_0 (J^q - 1)/q ([URL23] 21),
     /// Gamma_0 tr(F - I) of the linear law.
     #[inline(always)]
-    fn strain_entropy<T: Lane>(&self, d: &Deformation<T>) -> (T, T) {
+    fn strain_entropy<T: Precise>(&self, d: &Deformation<T>) -> (T, T) {
         let gamma = d.j.of(self.gamma);
         if self.linear {
             let trace = d.f[0][0] + d.f[1][1] + d.f[2][2] - d.j.of(3.0);
@@ -108,7 +108,7 @@ impl Thermal {
 
     /// Temperature and what follows from it, of the entropy eta per unit initial volume ([URL23] 19, 20).
     #[inline(always)]
-    pub fn warmth<T: Lane>(&self, d: &Deformation<T>, eta: T) -> Warmth<T> {
+    pub fn warmth<T: Precise>(&self, d: &Deformation<T>, eta: T) -> Warmth<T> {
         let (strain_entropy, slope) = self.strain_entropy(d);
         let (c_v, theta_r) = (eta.of(self.c_v), eta.of(self.theta_r));
         let warming = eta * eta.of(1.0 / self.c_v) - strain_entropy;
@@ -136,7 +136,7 @@ impl Thermal {
 
     /// Entropy per unit initial volume at a temperature: the inverse of [`warmth`](Self::warmth).
     #[inline(always)]
-    pub fn entropy<T: Lane>(&self, d: &Deformation<T>, theta: T) -> T {
+    pub fn entropy<T: Precise>(&self, d: &Deformation<T>, theta: T) -> T {
         let (strain_entropy, _) = self.strain_entropy(d);
         let ratio = theta * theta.of(1.0 / self.theta_r);
         let warming = if self.linear {
@@ -151,7 +151,7 @@ impl Thermal {
     /// -c_v Gamma_0 (J^(q-1) theta - theta_R) ([URL23] 30 with its misprint mended) and
     /// c_v theta_R Gamma_0 (J - 1) of (27).
     #[inline(always)]
-    pub fn couple<T: Lane>(&self, d: &Deformation<T>, w: &Warmth<T>, stress: &mut Stress<T>) {
+    pub fn couple<T: Precise>(&self, d: &Deformation<T>, w: &Warmth<T>, stress: &mut Stress<T>) {
         let one = d.j.of(1.0);
         let (theta_r, coupling) = (d.j.of(self.theta_r), d.j.of(self.c_v * self.gamma));
         let tension = -(coupling * w.slope.mul_add(w.theta, -theta_r));
@@ -185,14 +185,14 @@ impl Thermal {
 
     /// The part of a plastic work [J/m^3] that becomes heat.
     #[inline(always)]
-    pub fn plastic_heat<T: Lane>(&self, work: T) -> T {
+    pub fn plastic_heat<T: Precise>(&self, work: T) -> T {
         work * work.of(self.plastic_share)
     }
 
     /// Entropy that a heat [J/m^3] makes of a point at constant deformation: exact, so that the
     /// thermal energy rises by just this heat.
     #[inline(always)]
-    pub fn entropy_of_heat<T: Lane>(&self, theta: T, heat: T) -> T {
+    pub fn entropy_of_heat<T: Precise>(&self, theta: T, heat: T) -> T {
         if self.linear {
             heat * heat.of(1.0 / self.theta_r)
         } else {

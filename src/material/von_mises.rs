@@ -1,7 +1,7 @@
 //! Rate-independent von Mises plasticity with linear and saturation hardening ([URL22] tables 3, 4).
 
 use super::hencky::{Flow, Trial, Yield};
-use crate::lane::Lane;
+use crate::lane::Precise;
 
 /// tau_y = tau_0 + H e + (tau_inf - tau_0) (1 - exp(-delta e)) of the equivalent plastic strain e.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ impl VonMises {
 
     /// Yield stress and its slope.
     #[inline(always)]
-    fn at<T: Lane>(&self, strain: T) -> (T, T) {
+    fn at<T: Precise>(&self, strain: T) -> (T, T) {
         let (mut stress, mut slope) = (
             strain.mul_add(
                 strain.of(self.hardening_modulus),
@@ -50,7 +50,7 @@ impl Yield for VonMises {
     /// Newton's iteration for R(x) = q - 3 mu x - tau_y(e + x). R falls and is convex, so from R(0) > 0
     /// the iterates rise to the root without passing it; for linear hardening the first is the root.
     #[inline(always)]
-    fn flow<T: Lane>(&self, trial: &Trial<T>) -> Flow<T> {
+    fn flow<T: Precise>(&self, trial: &Trial<T>) -> Flow<T> {
         // Round-off of R is a few units of q's; a step below it would not end.
         const TOLERANCE: f64 = 1e-14;
         let Trial {

@@ -565,8 +565,8 @@ impl Work for Prolong<'_, '_> {
     fn run<T: Lane>(self, _: T::Token) -> [f64; 3] {
         let residual = self.residual.components();
         let layout = self.residual.layout();
-        let (from, slices) = layout.slab_range(self.slab);
-        let to = (from + slices * crate::lane::SLICE).min(Layout::slot(layout.particles));
+        let (from, slots) = layout.slab_range(self.slab);
+        let to = (from + slots).min(Layout::slot(layout.particles));
         let mut products = [0.0; 3];
         for slot in from..to {
             let cell = &self.finest.cells[self.finest.cell_of[slot - Layout::FIRST] as usize];

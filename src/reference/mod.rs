@@ -19,24 +19,26 @@
 mod coarse;
 mod pairs;
 mod repair;
+mod single;
 mod slices;
 mod updated;
 
 use crate::error::{Error, Result};
 use crate::kernel;
-use crate::lane::{Lane, SLICE, Slots, Work, vectorised};
+use crate::lane::{Lane, Real, SLICE, Slots, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::math::*;
 use crate::neighbours::Graph;
 use crate::parallel;
 use crate::particles::{Mesh, Particles, Shape};
-use crate::scene::{Numerics, Operators, ReferenceUpdate, Weights};
+use crate::scene::{Numerics, Operators, Precision, ReferenceUpdate, Weights};
 
 use pairs::{Closed, Lean, StoredVectors};
 pub(crate) use pairs::{PairVectors, Pairs, with_pairs};
 pub use repair::Repair;
 use repair::{Flat, Goal, Multipliers, Problem};
-use slices::Slices;
+use single::Single;
+pub(crate) use slices::Slices;
 use updated::{Kernels, PulledBackVectors, PulledBackWeights, SmoothingLength};
 
 /// Tolerance of the closure and most iterations of a repair at the start: round-off, in 20 to 80
@@ -84,6 +86,8 @@ pub struct Reference {
     /// What closes the operators, if they are repaired.
     closed: Option<ClosedOperators>,
     stored: Option<StoredVectors>,
+    /// What sums over pairs in single precision read.
+    single: Option<Single>,
     /// What gradients and forces are made of.
     pub operators: Operators,
     option: u8,
@@ -106,7 +110,7 @@ struct ClosedOperators {
 }
 
 #[inline(always)]
-pub(crate) fn load3<T: Lane>(token: T::Token, from: &[&[f64]; 3], at: usize) -> Vec3<T> {
+pub(crate) fn load3<T: Lane>(token: T::Token, from: &[&[impl Real]; 3], at: usize) -> Vec3<T> {
     [
         T::load(token, from[0], at),
         T::load(token, from[1], at),
@@ -115,7 +119,7 @@ pub(crate) fn load3<T: Lane>(token: T::Token, from: &[&[f64]; 3], at: usize) -> 
 }
 
 #[inline(always)]
-pub(crate) fn load9<T: Lane>(token: T::Token, from: &[&[f64]; 9], at: usize) -> Mat3<T> {
+pub(crate) fn load9<T: Lane>(token: T::Token, from: &[&[impl Real]; 9], at: usize) -> Mat3<T> {
     let [a, b, c, d, e, f, g, h, i] = from;
     [
         load3(token, &[a, b, c], at),
@@ -125,14 +129,14 @@ pub(crate) fn load9<T: Lane>(token: T::Token, from: &[&[f64]; 9], at: usize) -> 
 }
 
 #[inline(always)]
-pub(crate) fn store3<T: Lane>(value: &Vec3<T>, to: &mut [&mut [f64]; 3], at: usize) {
+pub(crate) fn store3<T: Lane>(value: &Vec3<T>, to: &mut [&mut [impl Real]; 3], at: usize) {
     for (c, v) in value.iter().enumerate() {
         v.store(to[c], at);
     }
 }
 
 #[inline(always)]
-pub(crate) fn store9<T: Lane>(value: &Mat3<T>, to: &mut [&mut [f64]; 9], at: usize) {
+pub(crate) fn store9<T: Lane>(value: &Mat3<T>, to: &mut [&mut [impl Real]; 9], at: usize) {
     for (r, row) in value.iter().enumerate() {
         for (c, v) in row.iter().enumerate() {
             v.store(to[3 * r + c], at);
@@ -186,6 +190,7 @@ impl Reference {
             neighbour_range: (counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0)),
             closed: None,
             stored: None,
+            single: (numerics.precision == Precision::Single).then(|| Single::new(graph, layout)),
             operators,
             option: numerics.kernel_option,
             weights: numerics.weights,
@@ -383,7 +388,7 @@ impl Reference {
     }
 
     /// The pair vectors now.
-    pub fn pair_vectors(&self) -> Pairs<'_> {
+    pub fn pair_vectors(&self) -> Pairs<'_, f64> {
         if let Some(closed) = &self.closed {
             let (k, x) = match (&closed.weights, &self.updated) {
                 (Some(k), Some(u)) => (bytemuck::must_cast_slice(k), u.chi.components()),
@@ -429,6 +434,10 @@ impl Reference {
             } else {
                 self.updated_vectors();
             }
+        }
+        if let Some(mut single) = self.single.take() {
+            single.round(self.layout, &self.slices, &self.pair_vectors());
+            self.single = Some(single);
         }
         self.correct().map_or(Ok(()), Err)
     }
@@ -511,7 +520,7 @@ impl Reference {
         let f_chi = updated.filter(|_| with_f_chi).map(|u| u.f_chi.components());
         let bad = parallel::map_slabs(
             l.slabs_mut(),
-            |slab, out| with_pairs!(this, pairs => vectorised(Correct { pairs, this, points, f_chi, slab, out })),
+            |slab, out| with_pairs!(this.pair_vectors(), pairs => vectorised(Correct { pairs, this, points, f_chi, slab, out })),
         );
         self.l = l;
         bad.into_iter().flatten().next()
@@ -595,7 +604,28 @@ impl Reference {
             + self.l.bytes()
             + updated
             + closed
+            + self.single.as_ref().map_or(0, Single::bytes)
             + self.stored.as_ref().map_or(0, StoredVectors::bytes)
+    }
+}
+
+/// A precision in which sums over pairs run.
+pub(crate) trait ReferenceReal: Real {
+    /// What they read of a reference.
+    fn pairs(reference: &Reference) -> (&Slices<Self>, Pairs<'_, Self>);
+}
+
+impl ReferenceReal for f64 {
+    fn pairs(reference: &Reference) -> (&Slices, Pairs<'_, f64>) {
+        (&reference.slices, reference.pair_vectors())
+    }
+}
+
+impl ReferenceReal for f32 {
+    fn pairs(reference: &Reference) -> (&Slices<f32>, Pairs<'_, f32>) {
+        let single = reference.single.as_ref();
+        let single = single.expect("a reference of a body with sums in single precision");
+        (&single.slices, single.pair_vectors())
     }
 }
 
@@ -637,9 +667,9 @@ impl<P: PairVectors> Work for Correct<'_, P> {
     type Output = Option<usize>;
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) -> Option<usize> {
-        let (first, slices) = self.this.layout.slab_range(self.slab);
+        let (first, slots) = self.this.layout.slab_range(self.slab);
         let mut bad = None;
-        for at in (0..slices * SLICE).step_by(T::WIDTH) {
+        for at in (0..slots).step_by(T::WIDTH) {
             let a = first + at;
             let f = match &self.f_chi {
                 Some(f_chi) => load9(token, f_chi, a),

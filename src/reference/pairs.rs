@@ -2,7 +2,7 @@
 
 use super::slices::Slices;
 use super::{load3, load9};
-use crate::lane::{Lane, SLICE, Slots};
+use crate::lane::{Lane, Real};
 use crate::layout::{Layout, level};
 use crate::math::*;
 
@@ -26,12 +26,12 @@ pub trait PairVectors: Copy + Sync {
 
 /// g_ab = k_ab (X_b - X_a) with k_ab = k_ba: 8 bytes a pair.
 #[derive(Clone, Copy)]
-pub struct Lean<'a> {
-    pub k: &'a [f64],
-    pub x: [&'a [f64]; 3],
+pub struct Lean<'a, E> {
+    pub k: &'a [E],
+    pub x: [&'a [E]; 3],
 }
 
-impl PairVectors for Lean<'_> {
+impl<E: Real> PairVectors for Lean<'_, E> {
     #[inline(always)]
     fn level(self, slots: usize) -> Self {
         Self {
@@ -63,16 +63,16 @@ impl PairVectors for Lean<'_> {
 /// g_ab = C_ab = k_ab [Lambda_a (X_b - X_a) + (mu_a - mu_b)/2] with k_ab = k_ba, by
 /// [`super::repair`]: 8 bytes a pair, and 12 numbers a particle.
 #[derive(Clone, Copy)]
-pub struct Closed<'a> {
-    pub k: &'a [f64],
-    pub x: [&'a [f64]; 3],
+pub struct Closed<'a, E> {
+    pub k: &'a [E],
+    pub x: [&'a [E]; 3],
     /// mu / 2 [m^2].
-    pub half_mu: [&'a [f64]; 3],
+    pub half_mu: [&'a [E]; 3],
     /// Lambda [m].
-    pub lambda: [&'a [f64]; 9],
+    pub lambda: [&'a [E]; 9],
 }
 
-impl PairVectors for Closed<'_> {
+impl<E: Real> PairVectors for Closed<'_, E> {
     #[inline(always)]
     fn level(self, slots: usize) -> Self {
         Self {
@@ -110,12 +110,12 @@ impl PairVectors for Closed<'_> {
 
 /// Both vectors stored: 48 bytes a pair.
 #[derive(Clone, Copy)]
-pub struct Stored<'a> {
-    ab: [&'a [f64]; 3],
-    ba: [&'a [f64]; 3],
+pub struct Stored<'a, E> {
+    pub(super) ab: [&'a [E]; 3],
+    pub(super) ba: [&'a [E]; 3],
 }
 
-impl PairVectors for Stored<'_> {
+impl<E: Real> PairVectors for Stored<'_, E> {
     #[inline(always)]
     fn level(self, _: usize) -> Self {
         let pairs = self.ab[0].len();
@@ -135,36 +135,37 @@ impl PairVectors for Stored<'_> {
 
 /// The vectors of [`Stored`], by pair.
 #[derive(Debug)]
-pub struct StoredVectors {
-    ab: [Vec<Slots>; 3],
-    ba: [Vec<Slots>; 3],
+pub struct StoredVectors<E: Real = f64> {
+    ab: [Vec<E::Slots>; 3],
+    ba: [Vec<E::Slots>; 3],
 }
 
-impl StoredVectors {
+impl<E: Real> StoredVectors<E> {
     /// All zero.
-    pub fn new(slices: &Slices) -> Self {
-        let zeros = || std::array::from_fn(|_| vec![Slots([0.0; SLICE]); slices.entries()]);
+    pub fn new(slices: &Slices<E>) -> Self {
+        let zeros = || std::array::from_fn(|_| vec![E::slots(0.0); slices.entries()]);
         Self {
             ab: zeros(),
             ba: zeros(),
         }
     }
     /// Read access.
-    pub fn get(&self) -> Stored<'_> {
+    pub fn get(&self) -> Stored<'_, E> {
         Stored {
-            ab: std::array::from_fn(|c| bytemuck::must_cast_slice(&self.ab[c][..])),
-            ba: std::array::from_fn(|c| bytemuck::must_cast_slice(&self.ba[c][..])),
+            ab: std::array::from_fn(|c| bytemuck::cast_slice(&self.ab[c][..])),
+            ba: std::array::from_fn(|c| bytemuck::cast_slice(&self.ba[c][..])),
         }
     }
     /// Adds to g_ab and g_ba of a pair.
     pub fn add(&mut self, pair: usize, ab: [f64; 3], ba: [f64; 3]) {
-        for c in 0..3 {
-            self.ab[c][pair / SLICE].0[pair % SLICE] += ab[c];
-            self.ba[c][pair / SLICE].0[pair % SLICE] += ba[c];
+        let all = self.ab.iter_mut().chain(&mut self.ba);
+        for (vector, more) in all.zip(ab.into_iter().chain(ba)) {
+            let value: &mut E = &mut bytemuck::cast_slice_mut(vector)[pair];
+            *value = E::nearest(value.value() + more);
         }
     }
     /// Components of g_ab, then of g_ba, for each slab.
-    pub fn slabs_mut(&mut self, slices: &Slices, layout: Layout) -> Vec<Vec<&mut [f64]>> {
+    pub fn slabs_mut(&mut self, slices: &Slices<E>, layout: Layout) -> Vec<Vec<&mut [E]>> {
         let vectors = self.ab.iter_mut().chain(self.ba.iter_mut());
         slices.split(layout, vectors.map(|v| &mut v[..]).collect())
     }
@@ -176,19 +177,19 @@ impl StoredVectors {
 }
 
 /// Which pair vectors there are now; the caller matches once, outside the particle loop.
-pub enum Pairs<'a> {
+pub enum Pairs<'a, E> {
     /// Symmetric weights times initial distances.
-    Lean(Lean<'a>),
+    Lean(Lean<'a, E>),
     /// The same with the multipliers that close them.
-    Closed(Closed<'a>),
+    Closed(Closed<'a, E>),
     /// Stored vectors.
-    Stored(Stored<'a>),
+    Stored(Stored<'a, E>),
 }
 
-/// Runs an expression with the reference's pair vectors bound to a name.
+/// Runs an expression with pair vectors bound to a name.
 macro_rules! with_pairs {
-    ($reference:expr, $name:ident => $body:expr) => {
-        match $reference.pair_vectors() {
+    ($pairs:expr, $name:ident => $body:expr) => {
+        match $pairs {
             $crate::reference::Pairs::Lean($name) => $body,
             $crate::reference::Pairs::Closed($name) => $body,
             $crate::reference::Pairs::Stored($name) => $body,

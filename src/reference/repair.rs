@@ -395,7 +395,7 @@ impl<'a> System<'a> {
         let (inverse, base) = (self.inverse.components(), self.base.components());
         let vector = half_mu.components();
         parallel::map_slabs(lambda.slabs_mut(), |slab, mut out| {
-            let (first, slices) = problem.layout.slab_range(slab);
+            let (first, slots) = problem.layout.slab_range(slab);
             vectorised(Gradient {
                 problem,
                 inverse,
@@ -404,7 +404,7 @@ impl<'a> System<'a> {
                 out: out.each_mut().map(|o| &mut **o),
             });
             for (out, base) in out.iter_mut().zip(base) {
-                for (o, b) in out.iter_mut().zip(&base[first..first + slices * SLICE]) {
+                for (o, b) in out.iter_mut().zip(&base[first..first + slots]) {
                     *o += b;
                 }
             }
@@ -434,9 +434,9 @@ impl<'a> System<'a> {
 /// Slots of a slab as (offset in the slab, slot), by lanes.
 #[inline(always)]
 fn lanes_of<T: Lane>(layout: Layout, slab: usize) -> impl Iterator<Item = (usize, usize)> {
-    let (first, slices) = layout.slab_range(slab);
+    let (first, slots) = layout.slab_range(slab);
     std::iter::zip(
-        (0..slices * SLICE).step_by(T::WIDTH),
+        (0..slots).step_by(T::WIDTH),
         (first..).step_by(T::WIDTH),
     )
 }

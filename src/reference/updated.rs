@@ -38,9 +38,9 @@ impl Work for SmoothingLength<'_> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
-        let (first, slices) = self.this.layout.slab_range(self.slab);
+        let (first, slots) = self.this.layout.slab_range(self.slab);
         let weights = self.this.slices.weights();
-        for at in (0..slices * SLICE).step_by(T::WIDTH) {
+        for at in (0..slots).step_by(T::WIDTH) {
             let a = first + at;
             let mut longest = T::splat(token, 0.0);
             for (b, pair) in self.this.slices.of(a) {
@@ -95,11 +95,11 @@ impl Work for PulledBackWeights<'_> {
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
         let this = self.kernels.this;
-        let (first, slices) = this.layout.slab_range(self.slab);
+        let (first, slots) = this.layout.slab_range(self.slab);
         let offset = this.slices.of_slab(this.layout, self.slab).start * SLICE;
         let weights = this.slices.weights();
         let (zero, half) = (T::splat(token, 0.0), T::splat(token, 0.5));
-        for a in (first..first + slices * SLICE).step_by(T::WIDTH) {
+        for a in (first..first + slots).step_by(T::WIDTH) {
             for (b, pair) in this.slices.of(a) {
                 let (_, _, with_b, with_a) = self.kernels.pair::<T>(token, a, b);
                 T::load(token, weights, pair)
@@ -126,12 +126,12 @@ impl Work for PulledBackVectors<'_> {
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) {
         let this = self.kernels.this;
-        let (first, slices) = this.layout.slab_range(self.slab);
+        let (first, slots) = this.layout.slab_range(self.slab);
         let offset = this.slices.of_slab(this.layout, self.slab).start * SLICE;
         let (weights, volume) = (this.slices.weights(), this.volume.components()[0]);
         let per_volume = T::splat(token, 1.0 / (self.mean_volume * self.mean_volume));
         let (zero, half) = (T::splat(token, 0.0), T::splat(token, 0.5));
-        for at in (0..slices * SLICE).step_by(T::WIDTH) {
+        for at in (0..slots).step_by(T::WIDTH) {
             let a = first + at;
             let (va, ja) = (T::load(token, volume, a), T::load(token, self.j_chi, a));
             for (b, pair) in this.slices.of(a) {

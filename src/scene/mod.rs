@@ -33,7 +33,7 @@ pub use geometry::{
 pub use heat::Heat;
 pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
-    Limiter, Neighbours, Numerics, Operators, Reconstruction, ReferenceUpdate, StateMeasures,
+    Limiter, Neighbours, Numerics, Operators, Precision, Reconstruction, ReferenceUpdate, StateMeasures,
     Weights,
 };
 pub use preset::Preset;

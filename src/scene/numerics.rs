@@ -28,6 +28,8 @@ pub struct Numerics {
     pub kernel_option: u8,
     /// When the reference configuration is updated.
     pub reference_update: ReferenceUpdate,
+    /// Precision of the sums over pairs.
+    pub precision: Precision,
     /// Which incremental deformation measures are independent unknowns.
     pub state: StateMeasures,
     /// Reconstruction of the velocity at the middle of a pair.
@@ -68,6 +70,7 @@ impl Default for Numerics {
             smoothing_factor: 0.6,
             kernel_option: 1,
             reference_update: ReferenceUpdate::Never,
+            precision: Precision::Double,
             state: StateMeasures::F,
             reconstruction: Reconstruction::Linear,
             limiter: Limiter::None,
@@ -180,6 +183,17 @@ pub enum ReferenceUpdate {
 /// the more the more often that is done, and from 0.2 on about as little as those of the initial configuration.
 fn default_strain() -> f64 {
     0.2
+}
+
+/// Precision of the sums over pairs: velocity gradients, internal forces and dissipation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 64 bits everywhere.
+    Double,
+    /// 32 bits for what pairs read and for the sums over them; 64 bits for the state, the law, loads and
+    /// energies. Forces and gradients are then good to about 1e-7 of what is summed.
+    Single,
 }
 
 /// Which incremental deformation measures are independent unknowns.
