@@ -202,6 +202,11 @@ impl Simulation {
                 .install(|| url.calibrate_conduction(state, reference));
             this.evaluate()?;
         }
+        if this.url.is_single_throughout()
+            && this.scene.numerics.reference_update == ReferenceUpdate::Never
+        {
+            this.reference.forget_double();
+        }
         this.first_length = this.evaluation.length;
         let e = &this.evaluation;
         this.accounts.initial = e.kinetic + e.strain + e.thermal - supplied;

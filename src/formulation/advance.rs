@@ -2,7 +2,7 @@
 
 use super::passes::{lanes_of, load_slab3, load_slab9};
 use super::url::State;
-use crate::lane::{Lane, Work};
+use crate::lane::{Lane, Real, Work};
 use crate::layout::Array;
 use crate::material::Thermal;
 use crate::math::*;
@@ -30,11 +30,11 @@ pub(super) struct Heating<'a> {
 
 /// One stage of the integrator for one slab: y = keep y0 + take (y + dt dy/dt); of the first stage y is y0, and what
 /// stands in `out` does not matter.
-pub(super) struct Advance<'a, const FIRST: bool> {
+pub(super) struct Advance<'a, E, const FIRST: bool> {
     pub reference: &'a Reference,
     pub start: &'a State,
     pub force: [&'a [f64]; 3],
-    pub grad_v: [&'a [f64]; 9],
+    pub grad_v: [&'a [E]; 9],
     pub j_rate: Option<&'a [f64]>,
     pub heating: Option<Heating<'a>>,
     pub density: f64,
@@ -45,7 +45,7 @@ pub(super) struct Advance<'a, const FIRST: bool> {
     pub out: StateSlab<'a>,
 }
 
-impl<const FIRST: bool> Work for Advance<'_, FIRST> {
+impl<E: Real, const FIRST: bool> Work for Advance<'_, E, FIRST> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(mut self, token: T::Token) {

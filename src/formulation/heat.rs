@@ -40,7 +40,7 @@ impl Url {
         let f = matrix(&state.f.get(slot));
         let cof = cofactor(&f);
         // Rate of ln J.
-        let dilation = double_dot(&matrix(&self.rates.grad_v.get(slot)), &cof) / dot(f[0], cof[0]);
+        let dilation = double_dot(&self.grad_v(slot), &cof) / dot(f[0], cof[0]);
         let theta = self.evaluated_temperature(slot);
         reference.volume.get(slot)[0] * thermal.uptake(&d, theta, rate, dilation)
     }

@@ -96,21 +96,20 @@ pub(super) fn lanes_from<T: Lane>(
 }
 
 /// Gradient of a vector field with respect to the reference (54).
-pub(super) struct Gradient<'a, 'o, 'p, P, E: Real> {
+pub(super) struct Gradient<'a, 'o, 'p, P, E: Real, F: Real> {
     pub slices: &'a Slices<E>,
     pub pairs: P,
-    pub reference: &'a Reference,
+    pub l: [&'a [E]; 9],
     pub field: [&'a [E]; 3],
     pub run: (usize, usize),
-    pub out: &'o mut [&'p mut [f64]; 9],
+    pub out: &'o mut [&'p mut [F]; 9],
 }
 
-impl<P: PairVectors, E: Real> PairWork for Gradient<'_, '_, '_, P, E> {
+impl<P: PairVectors, E: Real, F: Real> PairWork for Gradient<'_, '_, '_, P, E, F> {
     type Output = ();
     #[inline(always)]
     fn run<T: Lane>(self, token: T::Token) {
-        let l = self.reference.l.components();
-        let slots = l[0].len();
+        let slots = self.l[0].len();
         let (pairs, field) = (self.pairs.level(slots), level(self.field, slots));
         for (at, a) in lanes_from::<T>(self.run) {
             let centre = pairs.centre::<T>(token, a);
@@ -120,22 +119,22 @@ impl<P: PairVectors, E: Real> PairWork for Gradient<'_, '_, '_, P, E> {
                 let (g, _) = pairs.pair(token, &centre, b, pair);
                 sum = add_outer(&sum, sub3(load3(token, &field, b), own), g);
             }
-            store9(&mat_mul_t(&sum, &load9(token, &l, a)), self.out, at);
+            store9(&mat_mul_t(&sum, &load9(token, &self.l, a)), self.out, at);
         }
     }
 }
 
 /// What the gradient, law and point passes leave for later, of a run of slots.
-pub(super) struct Kept<'a> {
-    pub grad_v: [&'a mut [f64]; 9],
+pub(super) struct Kept<'a, E> {
+    pub grad_v: [&'a mut [E]; 9],
     pub sigma_j: Option<&'a mut [f64]>,
     /// Temperature and the variable whose gradient drives conduction.
     pub theta: Option<[&'a mut [f64]; 2]>,
 }
 
-impl Kept<'_> {
+impl<E> Kept<'_, E> {
     /// Some of the slots.
-    pub fn part(&mut self, range: Range<usize>) -> Kept<'_> {
+    pub fn part(&mut self, range: Range<usize>) -> Kept<'_, E> {
         Kept {
             grad_v: self.grad_v.each_mut().map(|c| &mut c[range.clone()]),
             sigma_j: self.sigma_j.as_mut().map(|s| &mut s[range.clone()]),
@@ -149,7 +148,7 @@ impl Kept<'_> {
 
 /// Output of the gradient, law and point passes for a run of slots.
 pub(super) struct PointOutput<'a, E: Real> {
-    pub kept: Kept<'a>,
+    pub kept: Kept<'a, E>,
     /// As Q, P from the law pass, where formulation and material meet; Q from the point pass.
     pub block: BlockPart<'a, E>,
 }
@@ -160,6 +159,7 @@ pub(super) struct Points<'a, 'o, 'p, E: Real> {
     pub density: f64,
     pub kinematics: Kinematics<'a>,
     pub reference: &'a Reference,
+    pub l: [&'a [E]; 9],
     pub v: [&'a [f64]; 3],
     /// Spacing tensors ([`spacings`]), where they bound the step.
     pub spacing: Option<[&'a [f64]; 6]>,
@@ -183,6 +183,7 @@ impl<E: Real> Work for Points<'_, '_, '_, E> {
         let Self {
             kinematics,
             reference,
+            l,
             v,
             spacing,
             run,
@@ -190,7 +191,7 @@ impl<E: Real> Work for Points<'_, '_, '_, E> {
             ..
         } = self;
         let PointOutput { kept, block } = out;
-        let (l, volume) = (reference.l.components(), reference.volume.components()[0]);
+        let volume = reference.volume.components()[0];
         let density = T::splat(token, self.density);
         let half = T::splat(token, 0.5);
         let mut kinetic = PerSlot::new(0.0);

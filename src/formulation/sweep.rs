@@ -24,7 +24,7 @@ use crate::lane::{Precise, Real, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::material::{Law, with_law};
 use crate::parallel::{self, PerThread};
-use crate::reference::{PairVectors, Pairs, Reference, ReferenceReal, Slices, load3, store3, with_pairs};
+use crate::reference::{PairData, PairVectors, Pairs, Reference, ReferenceReal, Slices, load3, store3, with_pairs};
 
 
 /// Slots that a pass does at a time: few enough that what the next pass reads is still in a near cache, enough to
@@ -208,6 +208,8 @@ pub(super) struct Sweep<E: PairReal> {
     store: Store<E>,
     ends: Ends<E>,
     own: E::Own,
+    /// grad_chi v [1/s], reference.
+    pub grad_v: Array<9, E>,
 }
 
 /// Sums over pairs, each computed once for both of its particles, in chunks: what a chunk's pairs do behind its end
@@ -288,20 +290,23 @@ impl<E: Real> Chunk<'_, E> {
 
 /// What the point pass fills, by particle.
 pub(super) struct Outputs<'a> {
-    pub grad_v: &'a mut Array<9>,
     pub sigma_j: Option<&'a mut Array<1>>,
     pub theta: Option<&'a mut Array<2>>,
 }
 
 impl Outputs<'_> {
     /// In pieces of so many slots.
-    fn pieces(&mut self, each: usize) -> Vec<Kept<'_>> {
+    fn pieces<'b, E: Real>(
+        &'b mut self,
+        grad_v: &'b mut Array<9, E>,
+        each: usize,
+    ) -> Vec<Kept<'b, E>> {
         let mut sigma_j = self
             .sigma_j
             .as_mut()
             .map(|s| s.pieces_mut(each).into_iter());
         let mut theta = self.theta.as_mut().map(|t| t.pieces_mut(each).into_iter());
-        let grad_v = self.grad_v.pieces_mut(each).into_iter();
+        let grad_v = grad_v.pieces_mut(each).into_iter();
         grad_v
             .map(|grad_v| Kept {
                 grad_v,
@@ -462,6 +467,7 @@ pub(super) struct Task<'a> {
 struct Passes<'a, E: PairReal> {
     task: Task<'a>,
     slices: &'a Slices<E>,
+    l: [&'a [E]; 9],
     /// x and v as pairs read them.
     motion: [[&'a [E]; 3]; 2],
 }
@@ -478,10 +484,12 @@ impl<E: PairReal> Passes<'_, E> {
         run: (usize, usize),
         mut out: PointOutput<E>,
     ) -> Result<Evaluation, Breakdown> {
-        let Self { task, slices, .. } = *self;
+        let Self {
+            task, slices, l, ..
+        } = *self;
         let (reference, v) = (task.reference, task.state.v.components());
-        with_pairs!(E::pairs(reference).1, pairs => R::run_pairs::<E, _>(Gradient {
-            slices, pairs, reference, field: self.motion[1], run, out: &mut out.kept.grad_v,
+        with_pairs!(E::pairs(reference).vectors, pairs => R::run_pairs::<E, _>(Gradient {
+            slices, pairs, l, field: self.motion[1], run, out: &mut out.kept.grad_v,
         }));
         let stored = with_law!(task.law, law => {
             stresses::<R, _, E>(law, task.inputs, task.flow, run, &mut out)
@@ -490,6 +498,7 @@ impl<E: PairReal> Passes<'_, E> {
             density: task.law.density(),
             kinematics: task.inputs.kinematics,
             reference,
+            l,
             v,
             spacing: task.spacing,
             run,
@@ -520,7 +529,7 @@ impl<E: PairReal> Passes<'_, E> {
         &self,
         first: usize,
         slots: Range<usize>,
-        kept: &mut Kept,
+        kept: &mut Kept<E>,
         (block, at): (&mut Block<E>, usize),
     ) -> Result<Evaluation, Breakdown> {
         let run = (first + slots.start, slots.len());
@@ -556,8 +565,8 @@ impl<E: PairReal> Passes<'_, E> {
                 }
             };
         }
-        let (_, pairs) = E::pairs(self.task.reference);
-        let (dissipation, length) = with_pairs!(pairs, pairs => forces!(
+        let PairData { vectors, .. } = E::pairs(self.task.reference);
+        let (dissipation, length) = with_pairs!(vectors, pairs => forces!(
             pairs, CONSTANT, LINEAR, MINMOD, SHOCK, OFF, GUARDED
         ));
         Evaluation {
@@ -572,7 +581,7 @@ impl<E: PairReal> Passes<'_, E> {
         &self,
         chunk: &Chunk<E>,
         window: &mut Window<E>,
-        (mut kept, mut sums): (Kept, Sums<E>),
+        (mut kept, mut sums): (Kept<E>, Sums<E>),
     ) -> Result<Evaluation, Breakdown> {
         sums.clear();
         let (first, slots) = chunk.range;
@@ -596,7 +605,7 @@ impl<E: PairReal> Passes<'_, E> {
         chunk: &Chunk<E>,
         slots: Range<usize>,
         window: &mut Window<E>,
-        kept: &mut Kept,
+        kept: &mut Kept<E>,
     ) -> Result<Evaluation, Breakdown> {
         let (first, count) = chunk.range;
         let within =
@@ -666,7 +675,7 @@ impl<E: PairReal> Sweep<E> {
     /// Of a body.
     pub fn new(reference: &Reference, needs: Needs) -> Self {
         let layout = reference.layout;
-        let reach = E::pairs(reference).0.reach().max(E::SLICE);
+        let reach = E::pairs(reference).slices.reach().max(E::SLICE);
         let reaches = (layout.slots / (CHUNKS * reach)).clamp(REACHES.0, REACHES.1);
         let each = (reaches * reach).max(layout.slab);
         let block = |slots: usize| Block::new(Layout::new(slots), needs.areas, needs.gradients);
@@ -696,6 +705,7 @@ impl<E: PairReal> Sweep<E> {
                 behind: vec![E::slots(0.0); chunks * 3 * reach / E::SLICE],
             },
             own: E::own(layout),
+            grad_v: Array::new(layout, [0.0; 9]),
         }
     }
 
@@ -711,8 +721,13 @@ impl<E: PairReal> Sweep<E> {
         let Store::Whole(block) = &self.store else {
             unreachable!("the block of the whole body is kept for them");
         };
-        let (slices, _) = E::pairs(reference);
+        let PairData { slices, .. } = E::pairs(reference);
         ForceInput::new(E::motion(&self.own, state), reference, slices, block)
+    }
+
+    /// Whether passes over all neighbours may follow, which read pairs in double precision.
+    pub fn is_whole(&self) -> bool {
+        matches!(self.store, Store::Whole(_))
     }
 
     /// Number of chunks.
@@ -729,26 +744,31 @@ impl<E: PairReal> Sweep<E> {
         force: &mut Array<3>,
     ) -> Result<Evaluation, Breakdown> {
         let Self {
-            layout, ends, own, ..
+            layout,
+            ends,
+            own,
+            grad_v,
+            ..
         } = self;
         let (layout, each, reach) = (*layout, ends.each, ends.reach);
         E::take(own, task.state);
         let (sums, motion) = E::sums(own, task.state, force);
-        let (slices, pairs) = E::pairs(task.reference);
+        let PairData { slices, vectors, l } = E::pairs(task.reference);
         let passes = Passes {
             task,
             slices,
+            l,
             motion,
         };
         let total = match &mut self.store {
             Store::Whole(block) => {
-                let slabs = std::iter::zip(out.pieces(layout.slab), block.slabs_mut());
+                let slabs = std::iter::zip(out.pieces(grad_v, layout.slab), block.slabs_mut());
                 let points = parallel::map_slabs(slabs.collect(), |slab, (kept, block)| {
                     let run = layout.slab_range(slab);
                     passes.points::<R>(run, PointOutput { kept, block })
                 });
                 let points = Evaluation::sum(points)?;
-                if let (Pairs::Closed(pairs), Some(_)) = (pairs, &block.half_grad) {
+                if let (Pairs::Closed(pairs), Some(_)) = (vectors, &block.half_grad) {
                     passes.bound::<R, _>(pairs, block, ends, sums);
                 }
                 let input = passes.input(block);
@@ -756,7 +776,7 @@ impl<E: PairReal> Sweep<E> {
                 Evaluation::sum([points].into_iter().chain(forces).map(Ok))?
             }
             Store::Chunks { heads, windows } => {
-                let chunks = std::iter::zip(out.pieces(each), &mut *heads).collect();
+                let chunks = std::iter::zip(out.pieces(grad_v, each), &mut *heads).collect();
                 let points = parallel::map_slabs(chunks, |chunk, (mut kept, head)| {
                     let (first, slots) = layout.piece_range(chunk, each);
                     let starts = (0..slots.min(reach)).step_by(TILE);
@@ -766,7 +786,7 @@ impl<E: PairReal> Sweep<E> {
                     }))
                 });
                 let points = Evaluation::sum(points)?;
-                let chunks = std::iter::zip(out.pieces(each), ends.chunks(sums));
+                let chunks = std::iter::zip(out.pieces(grad_v, each), ends.chunks(sums));
                 let heads = &*heads;
                 let head = |chunk: usize| {
                     let (_, slots) = layout.piece_range(chunk, each);
@@ -798,6 +818,6 @@ impl<E: PairReal> Sweep<E> {
                     + windows.sum(|window| window.block.bytes())
             }
         };
-        blocks + std::mem::size_of_val(&self.ends.behind[..]) + E::bytes(&self.own)
+        blocks + std::mem::size_of_val(&self.ends.behind[..]) + E::bytes(&self.own) + self.grad_v.bytes()
     }
 }

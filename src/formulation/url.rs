@@ -53,8 +53,6 @@ pub struct State {
 pub struct Rates {
     /// T_a [N]: internal force; loads are added in place when a stage is assembled.
     pub force: Array<3>,
-    /// grad_chi v [1/s], reference.
-    pub grad_v: Array<9>,
     /// dj/dt by the dissipation D^j alone [1/s]; only where D^j is on.
     pub j_dissipation: Option<Array<1>>,
     /// Heat that flows into a particle [W]: conduction; sources and fluxes are added in place when a
@@ -310,7 +308,6 @@ impl Url {
             spacing: (law.has_history() && !bound).then(|| spacings(reference)),
             rates: Rates {
                 force: Array::new(layout, [0.0; 3]),
-                grad_v: Array::new(layout, [0.0; 9]),
                 j_dissipation: volume.then(|| Array::new(layout, [0.0])),
                 heat: thermal.map(|_| Array::new(layout, [0.0])),
             },
@@ -407,6 +404,17 @@ impl Url {
         Ok(total)
     }
 
+    /// grad_chi v of the last evaluation in a slot [1/s], reference.
+    pub(super) fn grad_v(&self, slot: usize) -> Mat3<f64> {
+        with_sweep!(&self.sweep, sweep => matrix(&sweep.grad_v.get(slot)))
+    }
+
+    /// Whether only sums over pairs in single precision are asked for while the reference stays as it is.
+    pub fn is_single_throughout(&self) -> bool {
+        !self.options.venkatakrishnan
+            && matches!(&self.sweep, Sweeps::Single(sweep) if !sweep.is_whole())
+    }
+
     /// Whether heat is conducted.
     pub fn conducts(&self) -> bool {
         self.conduction.is_some()
@@ -467,7 +475,6 @@ impl Url {
             },
         };
         let outputs = Outputs {
-            grad_v: &mut rates.grad_v,
             sigma_j: scratch.sigma_j.as_mut().map(|(sigma_j, _)| sigma_j),
             theta: scratch.theta.as_mut(),
         };
@@ -549,10 +556,7 @@ impl Url {
         (keep, take): (f64, f64),
         dt: f64,
     ) {
-        let (force, grad_v) = (
-            self.rates.force.components(),
-            self.rates.grad_v.components(),
-        );
+        let force = self.rates.force.components();
         let j_rate = self.rates.j_dissipation.as_ref().map(|r| r.components()[0]);
         let density = self.law.density();
         let heating = self.heating();
@@ -575,13 +579,13 @@ impl Url {
             })
             .collect();
         macro_rules! advance {
-            ($first:literal) => {
+            ($first:literal, $grad_v:expr) => {
                 parallel::map_slabs(slabs, |slab, out| {
-                    vectorised(Advance::<$first> {
+                    vectorised(Advance::<_, $first> {
                         reference,
                         start,
                         force,
-                        grad_v,
+                        grad_v: $grad_v,
                         j_rate,
                         heating,
                         density,
@@ -594,11 +598,14 @@ impl Url {
                 })
             };
         }
-        if keep == 0.0 {
-            advance!(true);
-        } else {
-            advance!(false);
-        }
+        with_sweep!(&self.sweep, sweep => {
+            let grad_v = sweep.grad_v.components();
+            if keep == 0.0 {
+                advance!(true, grad_v);
+            } else {
+                advance!(false, grad_v);
+            }
+        });
     }
 
     /// Makes the current configuration the reference ([URL22] algorithm 1, steps 5 to 8): F_chi <-
@@ -681,7 +688,6 @@ impl Url {
             let cof = cofactor(&f);
             dot(f[0], cof[0]) / largest_eigenvalue(&mat_mul_t(&cof, &cof)).sqrt()
         };
-        let weights = reference.slices.weights();
         let (mut shortest, mut closest) = (f64::INFINITY, None);
         let (mut least, mut thinnest) = (f64::INFINITY, Layout::FIRST);
         let stretches = parallel::fill(reference.layout.particles, |i| stretch(Layout::slot(i)));
@@ -690,11 +696,7 @@ impl Url {
             if own < least {
                 (least, thinnest) = (own, a);
             }
-            for (b, pair) in reference.slices.of(a) {
-                if weights[pair] <= 0.0 {
-                    // No neighbour, and perhaps no particle.
-                    continue;
-                }
+            for b in reference.neighbours(a) {
                 let dx = sub3(state.x.get(b), state.x.get(a));
                 let length = dot(dx, dx).sqrt() * 0.5 * (own + stretches[b - Layout::FIRST]);
                 if length < shortest {
@@ -731,7 +733,6 @@ impl Url {
         with_sweep!(&self.sweep, sweep => sweep.bytes())
             + s.sigma_j.as_ref().map_or(0, |(a, b)| a.bytes() + b.bytes())
             + self.rates.force.bytes()
-            + self.rates.grad_v.bytes()
             + self.rates.j_dissipation.as_ref().map_or(0, Array::bytes)
             + s.theta.as_ref().map_or(0, Array::bytes)
             + self.rates.heat.as_ref().map_or(0, Array::bytes)
@@ -762,11 +763,11 @@ impl Runner for Vectors {
 pub fn deform(state: &mut State, reference: &Reference) {
     let layout = reference.layout;
     let x = state.x.components();
-    let mut f = Array::new(layout, flat(&IDENTITY));
+    let mut f: Array<9> = Array::new(layout, flat(&IDENTITY));
     parallel::map_slabs(f.slabs_mut(), |slab, mut out| {
         let run = layout.slab_range(slab);
         with_pairs!(reference.pair_vectors(), pairs => f64::vectorised(Gradient {
-            slices: &reference.slices, pairs, reference, field: x, run, out: &mut out,
+            slices: &reference.slices, pairs, l: reference.l.components(), field: x, run, out: &mut out,
         }));
     });
     for slot in (0..layout.particles).map(Layout::slot) {
@@ -895,7 +896,7 @@ mod tests {
                 .expect("a good state");
             let rates = |url: &Url| {
                 let (j, heat) = (url.rates.j_dissipation.clone(), url.rates.heat.clone());
-                (url.rates.force.clone(), url.rates.grad_v.clone(), j, heat)
+                (url.rates.force.clone(), url.gradients(), j, heat)
             };
             let kept = rates(&url);
             let check = |again: std::result::Result<Evaluation, Breakdown>, url: &Url| {
@@ -1018,7 +1019,7 @@ mod tests {
             url.evaluate(&state, &reference, None)
                 .expect("a good state");
             for slot in slots() {
-                for (own, exact) in url.rates.grad_v.get(slot).iter().zip(flat(&gradient)) {
+                for (own, exact) in flat(&url.grad_v(slot)).iter().zip(flat(&gradient)) {
                     linear = linear.max((own - exact).abs());
                 }
             }

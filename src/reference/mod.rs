@@ -410,6 +410,20 @@ impl Reference {
         }
     }
 
+    /// Slots of the neighbours of the particle in a slot.
+    pub fn neighbours(&self, slot: usize) -> Box<dyn Iterator<Item = usize> + '_> {
+        match &self.single {
+            Some(single) => Box::new(single.slices.neighbours(slot)),
+            None => Box::new(self.slices.neighbours(slot)),
+        }
+    }
+
+    /// Gives up what sums over pairs in double precision read, once nothing will read it any more.
+    pub fn forget_double(&mut self) {
+        self.slices = Slices::empty();
+        self.l = Array::empty();
+    }
+
     /// Computes everything that follows from new fields of [`Updated`], for the scene's kernel option.
     ///
     /// # Errors
@@ -435,11 +449,12 @@ impl Reference {
                 self.updated_vectors();
             }
         }
+        let bad = self.correct();
         if let Some(mut single) = self.single.take() {
-            single.round(self.layout, &self.slices, &self.pair_vectors());
+            single.round(f64::pairs(self), self.layout);
             self.single = Some(single);
         }
-        self.correct().map_or(Ok(()), Err)
+        bad.map_or(Ok(()), Err)
     }
 
     /// Repairs the operators of an updated reference, from the multipliers of the one before, with
@@ -609,23 +624,36 @@ impl Reference {
     }
 }
 
+/// What sums over pairs read of a reference.
+pub(crate) struct PairData<'a, E: Real> {
+    /// Neighbours.
+    pub slices: &'a Slices<E>,
+    /// The pair vectors now.
+    pub vectors: Pairs<'a, E>,
+    /// L_a.
+    pub l: [&'a [E]; 9],
+}
+
 /// A precision in which sums over pairs run.
 pub(crate) trait ReferenceReal: Real {
-    /// What they read of a reference.
-    fn pairs(reference: &Reference) -> (&Slices<Self>, Pairs<'_, Self>);
+    /// What they read.
+    fn pairs(reference: &Reference) -> PairData<'_, Self>;
 }
 
 impl ReferenceReal for f64 {
-    fn pairs(reference: &Reference) -> (&Slices, Pairs<'_, f64>) {
-        (&reference.slices, reference.pair_vectors())
+    fn pairs(reference: &Reference) -> PairData<'_, f64> {
+        PairData {
+            slices: &reference.slices,
+            vectors: reference.pair_vectors(),
+            l: reference.l.components(),
+        }
     }
 }
 
 impl ReferenceReal for f32 {
-    fn pairs(reference: &Reference) -> (&Slices<f32>, Pairs<'_, f32>) {
+    fn pairs(reference: &Reference) -> PairData<'_, f32> {
         let single = reference.single.as_ref();
-        let single = single.expect("a reference of a body with sums in single precision");
-        (&single.slices, single.pair_vectors())
+        single.expect("made for single precision").pairs()
     }
 }
 

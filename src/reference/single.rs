@@ -3,6 +3,7 @@
 //! Pair vectors are made in double precision and rounded once. Points are taken from one in the middle of the
 //! body: a difference of two of them is then good to the round-off of the body's size, wherever it stands.
 
+use super::PairData;
 use super::pairs::{Closed, Lean, Pairs, Stored, StoredVectors};
 use super::slices::Slices;
 use crate::layout::{Array, Layout};
@@ -20,6 +21,7 @@ pub struct Single {
     /// mu / 2 and Lambda of repaired operators.
     multipliers: Option<(Array<3, f32>, Array<9, f32>)>,
     stored: Option<StoredVectors<f32>>,
+    l: Array<9, f32>,
 }
 
 impl Single {
@@ -30,26 +32,29 @@ impl Single {
             x: Array::new(layout, [0.0; 3]),
             multipliers: None,
             stored: None,
+            l: Array::new(layout, [0.0; 9]),
         }
     }
 
     /// Takes over new pair vectors.
-    pub fn round(&mut self, layout: Layout, slices: &Slices, pairs: &Pairs<f64>) {
+    pub fn round(&mut self, pairs: PairData<f64>, layout: Layout) {
+        let PairData { slices, vectors, l } = pairs;
+        let slots = || (0..layout.particles).map(Layout::slot);
         let points = |to: &mut Array<3, f32>, x: &[&[f64]; 3]| {
             let middle = x.map(|x| x[Layout::slot(layout.particles / 2)]);
-            for slot in (0..layout.particles).map(Layout::slot) {
+            for slot in slots() {
                 to.set(slot, sub3(x.map(|x| x[slot]), middle));
             }
         };
         self.slices.take_weights(
             layout,
             slices,
-            match pairs {
+            match &vectors {
                 Pairs::Lean(Lean { k, .. }) | Pairs::Closed(Closed { k, .. }) => k,
                 Pairs::Stored(_) => slices.weights(),
             },
         );
-        match pairs {
+        match &vectors {
             Pairs::Lean(lean) => points(&mut self.x, &lean.x),
             Pairs::Closed(closed) => {
                 points(&mut self.x, &closed.x);
@@ -57,7 +62,7 @@ impl Single {
                     let half_mu = Array::new(layout, [0.0; 3]);
                     (half_mu, Array::new(layout, [0.0; 9]))
                 });
-                for slot in (0..layout.particles).map(Layout::slot) {
+                for slot in slots() {
                     half_mu.set(slot, closed.half_mu.map(|c| c[slot]));
                     lambda.set(slot, closed.lambda.map(|c| c[slot]));
                 }
@@ -73,10 +78,21 @@ impl Single {
                 });
             }
         }
+        for slot in slots() {
+            self.l.set(slot, l.map(|c| c[slot]));
+        }
     }
 
-    /// The pair vectors.
-    pub fn pair_vectors(&self) -> Pairs<'_, f32> {
+    /// What sums over pairs read.
+    pub fn pairs(&self) -> PairData<'_, f32> {
+        PairData {
+            slices: &self.slices,
+            vectors: self.vectors(),
+            l: self.l.components(),
+        }
+    }
+
+    fn vectors(&self) -> Pairs<'_, f32> {
         if let Some(stored) = &self.stored {
             return Pairs::Stored(stored.get());
         }
@@ -97,6 +113,7 @@ impl Single {
         let multipliers = self.multipliers.as_ref();
         self.slices.bytes()
             + self.x.bytes()
+            + self.l.bytes()
             + multipliers.map_or(0, |(mu, lambda)| mu.bytes() + lambda.bytes())
             + self.stored.as_ref().map_or(0, StoredVectors::bytes)
     }

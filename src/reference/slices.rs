@@ -72,14 +72,25 @@ impl<E: Real> Slices<E> {
         bytemuck::cast_slice(&self.weight)
     }
 
-    /// The lists of a graph; all weights 0.
-    pub(super) fn new(graph: &Graph, layout: Layout) -> Self {
-        let mut this = Self {
+    /// Slots of the neighbours of the particle in a slot.
+    pub fn neighbours(&self, a: usize) -> impl Iterator<Item = usize> {
+        let weights = self.weights();
+        self.of(a)
+            .filter_map(|(b, pair)| (weights[pair].value() > 0.0).then_some(b))
+    }
+
+    /// Of no particles.
+    pub(super) fn empty() -> Self {
+        Self {
             start: vec![0],
             after: Vec::new(),
             base: Vec::new(),
             weight: Vec::new(),
-        };
+        }
+    }
+    /// The lists of a graph; all weights 0.
+    pub(super) fn new(graph: &Graph, layout: Layout) -> Self {
+        let mut this = Self::empty();
         let mut offsets = Vec::new();
         for first in (0..layout.slots).step_by(E::SLICE) {
             let members = first.min(graph.count())..(first + E::SLICE).min(graph.count());
