@@ -89,7 +89,9 @@ impl Real for f64 {
     #[inline(always)]
     fn store_long<S: Simd>(value: S::f32s, to: &mut [Self]) {
         let lanes: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&value));
-        to.iter_mut().zip(lanes).for_each(|(t, l)| *t = f64::from(*l));
+        to.iter_mut()
+            .zip(lanes)
+            .for_each(|(t, l)| *t = f64::from(*l));
     }
     fn vectorised<W: PairWork>(work: W) -> W::Output {
         dispatch(OnDoubles(work))
@@ -122,7 +124,10 @@ impl Real for f32 {
     fn load_wide<S: Simd>(simd: S, from: &[Self]) -> S::f64s {
         let mut value = simd.splat_f64s(0.0);
         let lanes: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut value));
-        lanes.iter_mut().zip(from).for_each(|(l, v)| *l = f64::from(*v));
+        lanes
+            .iter_mut()
+            .zip(from)
+            .for_each(|(l, v)| *l = f64::from(*v));
         value
     }
     #[inline(always)]
@@ -541,13 +546,42 @@ macro_rules! vector {
     };
 }
 vector!(
-    Wide, f64, F64_LANES, f64::MIN_POSITIVE, load_wide, store_wide, splat_f64s, add_f64s, sub_f64s,
-    mul_f64s, div_f64s, neg_f64s, mul_add_f64s, sqrt_f64s, greater_than_f64s, select_f64s,
+    Wide,
+    f64,
+    F64_LANES,
+    f64::MIN_POSITIVE,
+    load_wide,
+    store_wide,
+    splat_f64s,
+    add_f64s,
+    sub_f64s,
+    mul_f64s,
+    div_f64s,
+    neg_f64s,
+    mul_add_f64s,
+    sqrt_f64s,
+    greater_than_f64s,
+    select_f64s,
     first_true_m64s
 );
 vector!(
-    Long, f32, F32_LANES, LONG_TINY, load_long, store_long, splat_f32s, add_f32s, sub_f32s, mul_f32s,
-    div_f32s, neg_f32s, mul_add_f32s, sqrt_f32s, greater_than_f32s, select_f32s, first_true_m32s
+    Long,
+    f32,
+    F32_LANES,
+    LONG_TINY,
+    load_long,
+    store_long,
+    splat_f32s,
+    add_f32s,
+    sub_f32s,
+    mul_f32s,
+    div_f32s,
+    neg_f32s,
+    mul_add_f32s,
+    sqrt_f32s,
+    greater_than_f32s,
+    select_f32s,
+    first_true_m32s
 );
 
 impl<S: Simd> Precise for Wide<S> {
@@ -575,12 +609,22 @@ impl PerSlot {
     /// Adds the value for the slots from `at`.
     #[inline(always)]
     pub fn add<T: Lane>(&mut self, at: usize, value: T) {
-        self.update(at, value, |sum, value| sum + value, |sum, value| sum + value);
+        self.update(
+            at,
+            value,
+            |sum, value| sum + value,
+            |sum, value| sum + value,
+        );
     }
     /// Takes the minimum with the value for the slots from `at`; a value that is NaN is ignored.
     #[inline(always)]
     pub fn min<T: Lane>(&mut self, at: usize, value: T) {
-        self.update(at, value, |least, value| value.min(least), |least, value| value.min(least));
+        self.update(
+            at,
+            value,
+            |least, value| value.min(least),
+            |least, value| value.min(least),
+        );
     }
     /// On lanes where they are of double precision, as the sums are.
     #[inline(always)]

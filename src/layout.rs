@@ -151,9 +151,7 @@ impl<const N: usize, E: Real> Array<N, E> {
             })
         };
         (0..slots.div_ceil(each))
-            .map(|_| {
-                std::array::from_fn(|c| pieces[c].next().expect("as many pieces as slabs"))
-            })
+            .map(|_| std::array::from_fn(|c| pieces[c].next().expect("as many pieces as slabs")))
             .collect()
     }
     /// Some slots, counted from the first one that holds a particle.

@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn venkatakrishnan_is_one_where_the_step_is_small_and_limits_extrema() {
-        assert!((venkatakrishnan(1.0, -1.0, 1e-9) - 1.0).abs() < 1e-8);
+        assert!((venkatakrishnan(1.0_f64, -1.0, 1e-9) - 1.0).abs() < 1e-8);
         assert!(venkatakrishnan(0.0, -1.0, 0.5) < 1e-299);
         assert!(venkatakrishnan(0.5, -1.0, 0.5) < 1.0);
         assert_eq!(venkatakrishnan(0.0, 0.0, 0.0), 1.0);

@@ -64,13 +64,21 @@ impl<'a> Kinematics<'a> {
 }
 
 #[inline(always)]
-pub(super) fn load_slab3<T: Lane>(token: T::Token, from: &[&mut [impl Real]; 3], at: usize) -> Vec3<T> {
+pub(super) fn load_slab3<T: Lane>(
+    token: T::Token,
+    from: &[&mut [impl Real]; 3],
+    at: usize,
+) -> Vec3<T> {
     let [a, b, c] = from;
     load3(token, &[a, b, c], at)
 }
 
 #[inline(always)]
-pub(super) fn load_slab9<T: Lane>(token: T::Token, from: &[&mut [impl Real]; 9], at: usize) -> Mat3<T> {
+pub(super) fn load_slab9<T: Lane>(
+    token: T::Token,
+    from: &[&mut [impl Real]; 9],
+    at: usize,
+) -> Mat3<T> {
     let [a, b, c, d, e, f, g, h, i] = from;
     load9(token, &[a, b, c, d, e, f, g, h, i], at)
 }
@@ -89,10 +97,7 @@ pub(super) fn lanes_of<T: Lane>(
 pub(super) fn lanes_from<T: Lane>(
     (first, slots): (usize, usize),
 ) -> impl Iterator<Item = (usize, usize)> {
-    std::iter::zip(
-        (0..slots).step_by(T::WIDTH),
-        (first..).step_by(T::WIDTH),
-    )
+    std::iter::zip((0..slots).step_by(T::WIDTH), (first..).step_by(T::WIDTH))
 }
 
 /// Gradient of a vector field with respect to the reference (54).
@@ -385,7 +390,12 @@ pub(super) struct ForceInput<'a, E: Real> {
 
 impl<'a, E: Real> ForceInput<'a, E> {
     /// With the block of the whole body.
-    pub(super) fn new(motion: [[&'a [E]; 3]; 2], reference: &'a Reference, slices: &'a Slices<E>, block: &'a Block<E>) -> Self {
+    pub(super) fn new(
+        motion: [[&'a [E]; 3]; 2],
+        reference: &'a Reference,
+        slices: &'a Slices<E>,
+        block: &'a Block<E>,
+    ) -> Self {
         let tensors =
             |array: &'a Option<Array<9, E>>| array.as_ref().map_or([&[][..]; 9], Array::components);
         Self {
@@ -414,7 +424,8 @@ impl<'a, E: Real> ForceInput<'a, E> {
     /// Place of a slot in q, s, half_grad and wave.
     #[inline(always)]
     fn place(&self, slot: usize) -> usize {
-        ((slot - self.first) & self.mask) + Layout::FIRST
+        // A lane without a neighbour may stand before the first particle.
+        (slot.wrapping_sub(self.first) & self.mask).wrapping_add(Layout::FIRST)
     }
 
     /// The same, and pair vectors, made to show that what a mode reads holds as many slots: one check of
@@ -496,7 +507,7 @@ impl<'a, E: Real> ForceInput<'a, E> {
         let (qa, sa) = (self.stress((), a), self.area((), a));
         let grad_a = self.half_grad((), a);
         let mut force = [0.0; 3];
-        for (b, pair) in self.slices.of(a) {
+        for (b, pair) in self.reference.slices.of(a) {
             let (g, back) = pairs.pair((), &centre, b, pair);
             let mut p = self.pair(&here, b);
             p.area = self.pair_area(&sa, b, (g, back));

@@ -80,8 +80,8 @@ pub fn jump<T: Lane, const MODE: u8>(
 pub fn dissipation<T: Lane>(pair: &Pair<T>, jump: Vec3<T>, speeds: WaveSpeeds<T>) -> Vec3<T> {
     let norm = dot(pair.area, pair.area).sqrt();
     // One division for the mean wave speed and for n (x) n; dummies have dx = 0 and no area.
-    let inverse = norm.of(0.5) * pair.density * norm
-        / pair.stretch.mul_add(pair.dx2, norm.of(T::TINY));
+    let inverse =
+        norm.of(0.5) * pair.density * norm / pair.stretch.mul_add(pair.dx2, norm.of(T::TINY));
     let along = (speeds.pressure - speeds.shear) * dot(pair.dx, jump);
     scale3(
         inverse,

@@ -14,18 +14,19 @@ use std::ops::Range;
 
 use super::laws::{LawInputs, stresses};
 use super::passes::{
-    Bound, Dissipated, ForceInput, Forces, Gradient, Kept, Limit, Motion, PointOutput, Points, Sums,
-    lanes_from,
+    Bound, Dissipated, ForceInput, Forces, Gradient, Kept, Limit, Motion, PointOutput, Points,
+    Sums, lanes_from,
 };
-use crate::math::*;
 use super::riemann::{self, WaveSpeeds};
 use super::url::{Breakdown, Evaluation, Runner, State};
 use crate::lane::{Precise, Real, Work, vectorised};
 use crate::layout::{Array, Layout};
 use crate::material::{Law, with_law};
+use crate::math::*;
 use crate::parallel::{self, PerThread};
-use crate::reference::{PairData, PairVectors, Pairs, Reference, ReferenceReal, Slices, load3, store3, with_pairs};
-
+use crate::reference::{
+    PairData, PairVectors, Pairs, Reference, ReferenceReal, Slices, load3, store3, with_pairs,
+};
 
 /// Slots that a pass does at a time: few enough that what the next pass reads is still in a near cache, enough to
 /// make the bookkeeping negligible.
@@ -713,11 +714,7 @@ impl<E: PairReal> Sweep<E> {
     ///
     /// # Panics
     /// Where such passes were not asked for.
-    pub fn input<'a>(
-        &'a self,
-        state: &'a State,
-        reference: &'a Reference,
-    ) -> ForceInput<'a, E> {
+    pub fn input<'a>(&'a self, state: &'a State, reference: &'a Reference) -> ForceInput<'a, E> {
         let Store::Whole(block) = &self.store else {
             unreachable!("the block of the whole body is kept for them");
         };
@@ -818,6 +815,9 @@ impl<E: PairReal> Sweep<E> {
                     + windows.sum(|window| window.block.bytes())
             }
         };
-        blocks + std::mem::size_of_val(&self.ends.behind[..]) + E::bytes(&self.own) + self.grad_v.bytes()
+        blocks
+            + std::mem::size_of_val(&self.ends.behind[..])
+            + E::bytes(&self.own)
+            + self.grad_v.bytes()
     }
 }

@@ -435,10 +435,7 @@ impl<'a> System<'a> {
 #[inline(always)]
 fn lanes_of<T: Lane>(layout: Layout, slab: usize) -> impl Iterator<Item = (usize, usize)> {
     let (first, slots) = layout.slab_range(slab);
-    std::iter::zip(
-        (0..slots).step_by(T::WIDTH),
-        (first..).step_by(T::WIDTH),
-    )
+    std::iter::zip((0..slots).step_by(T::WIDTH), (first..).step_by(T::WIDTH))
 }
 
 /// M^-1 and B of a slab; the first slot whose M is singular.
@@ -795,7 +792,7 @@ pub(super) mod tests {
             let l = |slot: usize| super::super::rows(reference.l.get(slot));
             let v = |slot: usize| reference.volume.get(slot)[0];
             let (mut e, mut m) = (particles.surface[i], [[0.0; 3]; 3]);
-            with_pairs!(reference, pairs => {
+            with_pairs!(reference.pair_vectors(), pairs => {
                 let centre = pairs.centre::<f64>((), a);
                 for (b, pair) in reference.slices.of(a) {
                     if reference.slices.weights()[pair] == 0.0 {

@@ -177,12 +177,7 @@ impl<E: Real> Slices<E> {
     }
 
     /// The same of the weights.
-    pub(super) fn take_weights<F: Real>(
-        &mut self,
-        layout: Layout,
-        other: &Slices<F>,
-        from: &[F],
-    ) {
+    pub(super) fn take_weights<F: Real>(&mut self, layout: Layout, other: &Slices<F>, from: &[F]) {
         let mut weight = std::mem::take(&mut self.weight);
         let pieces = self.split(layout, vec![&mut weight]);
         parallel::map_slabs(pieces, |slab, mut to| {

@@ -33,8 +33,8 @@ pub use geometry::{
 pub use heat::Heat;
 pub use material::{Elastic, JohnsonCook, Material, MooneyRivlin, VonMises};
 pub use numerics::{
-    Limiter, Neighbours, Numerics, Operators, Precision, Reconstruction, ReferenceUpdate, StateMeasures,
-    Weights,
+    Limiter, Neighbours, Numerics, Operators, Precision, Reconstruction, ReferenceUpdate,
+    StateMeasures, Weights,
 };
 pub use preset::Preset;
 pub use schema::json_schema;
