@@ -3,7 +3,7 @@
 use crate::particles::MeshSummary;
 use crate::reference::Repair;
 use crate::scene::{
-    Limiter, Material, Neighbours, Operators, Reconstruction, ReferenceUpdate, Scene,
+    Limiter, Material, Neighbours, Operators, Precision, Reconstruction, ReferenceUpdate, Scene,
     StateMeasures, Weights,
 };
 
@@ -166,6 +166,10 @@ pub(crate) fn features(scene: &Scene, operators: Operators) -> (Vec<String>, Vec
     feature(
         n.angular_momentum_projection,
         "angular-momentum projection".to_string(),
+    );
+    feature(
+        n.precision == Precision::Single,
+        "sums over pairs in single precision".to_string(),
     );
     feature(
         !scene.contact.is_empty(),

@@ -150,6 +150,13 @@ impl Simulation {
             let state = initial_state(&scene, &url, &reference, &particles)?;
             Ok((reference, state, url))
         })?;
+        url.check_range(&reference).map_err(|(what, size)| {
+            let message = format!(
+                "single precision does not hold the numbers that this body makes: {what} is {size:.1e}; \
+                 leave this out, or set \"double\""
+            );
+            Error::scene("numerics.precision", message)
+        })?;
         let mut this = Self {
             scene_hash: crate::snapshot::scene_hash(&scene),
             mesh: particles.mesh_summary(&scene),

@@ -63,6 +63,14 @@ pub const SCENES: &[Counted] = &[
         "update at every step, kernel option 3",
         &[EVERY_STEP, "numerics.kernel_option=3"],
     ),
+    shown(
+        "sums over pairs in single precision",
+        &["numerics.precision=single"],
+    ),
+    guarded(
+        "single precision, 20 % jitter, repaired",
+        &["numerics.precision=single", JITTER],
+    ),
     guarded(
         "update at a strain, kernel option 1, no update",
         &[STRAINED],

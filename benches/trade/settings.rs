@@ -103,6 +103,10 @@ pub const AXES: &[Axis] = &[
         ],
     ),
     (
+        "precision",
+        &[("single precision", &["numerics.precision=single"])],
+    ),
+    (
         "dissipation",
         &[
             (

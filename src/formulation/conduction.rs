@@ -66,7 +66,7 @@ impl Conduction {
     /// Heat into each particle [W]; the entropy produced [W/K] and the stable step [s].
     pub fn rates<R: Runner>(
         &mut self,
-        input: &ForceInput<impl Real>,
+        input: &ForceInput<impl Real, f64>,
         kinematics: &Kinematics,
         theta: &Array<2>,
         heat: &mut Array<1>,
@@ -107,7 +107,7 @@ impl Conduction {
     /// bears 0.65 times, a cube of 2^3 particles 0.55 times the step of a block.
     pub fn calibrate<R: Runner>(
         &mut self,
-        input: &ForceInput<impl Real>,
+        input: &ForceInput<impl Real, f64>,
         kinematics: &Kinematics,
         heat: &mut Array<1>,
     ) {
@@ -154,7 +154,7 @@ impl Conduction {
 /// s_ab and the fluxes; (entropy produced, smallest |x_ab|^2 V_R/v) of the slab.
 struct Jumps<'a, P, E: Real> {
     pairs: P,
-    input: ForceInput<'a, E>,
+    input: ForceInput<'a, E, f64>,
     kinematics: Kinematics<'a>,
     thermal: Thermal,
     theta: &'a [f64],

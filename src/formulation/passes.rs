@@ -371,14 +371,15 @@ impl<E: Real> Work for Limit<'_, '_, '_, E> {
     }
 }
 
-/// What the force pass reads of the neighbours.
+/// What the force pass reads of the neighbours: blocks, and x and v, which passes in double precision read
+/// of the state itself.
 #[derive(Clone, Copy)]
-pub(super) struct ForceInput<'a, E: Real> {
+pub(super) struct ForceInput<'a, E: Real, X = E> {
     pub reference: &'a Reference,
     /// Each pair's neighbours, for the passes in this precision.
     slices: &'a Slices<E>,
-    x: [&'a [E]; 3],
-    v: [&'a [E]; 3],
+    x: [&'a [X]; 3],
+    v: [&'a [X]; 3],
     q: [&'a [E]; 9],
     s: [&'a [E]; 9],
     half_grad: [&'a [E]; 9],
@@ -388,10 +389,10 @@ pub(super) struct ForceInput<'a, E: Real> {
     mask: usize,
 }
 
-impl<'a, E: Real> ForceInput<'a, E> {
+impl<'a, E: Real, X: Real> ForceInput<'a, E, X> {
     /// With the block of the whole body.
     pub(super) fn new(
-        motion: [[&'a [E]; 3]; 2],
+        [x, v]: [[&'a [X]; 3]; 2],
         reference: &'a Reference,
         slices: &'a Slices<E>,
         block: &'a Block<E>,
@@ -401,8 +402,8 @@ impl<'a, E: Real> ForceInput<'a, E> {
         Self {
             reference,
             slices,
-            x: motion[0],
-            v: motion[1],
+            x,
+            v,
             q: block.q.components(),
             s: tensors(&block.s),
             half_grad: tensors(&block.half_grad),
@@ -730,7 +731,7 @@ fn take_off<T: Lane, E: Real>(value: Vec3<T>, sums: &mut Sums<E>, at: usize) {
 /// Smallest squared length that the areas of the pairs allow the particles of one slab.
 pub(super) struct AreaLengths<'a, P, E: Real> {
     pub pairs: P,
-    pub input: ForceInput<'a, E>,
+    pub input: ForceInput<'a, E, f64>,
     /// rho_R [kg/m^3].
     pub density: f64,
     pub slab: usize,
@@ -885,7 +886,7 @@ impl<P: PairVectors> Work for HalfSlope<'_, P> {
 /// Scales the slopes for the reconstruction of D^j, as [`Bound`] the gradients for that of D^p.
 pub(super) struct BoundSlope<'a, P, E: Real> {
     pub pairs: P,
-    pub input: ForceInput<'a, E>,
+    pub input: ForceInput<'a, E, f64>,
     pub sigma: &'a [f64],
     pub pressure_speed: f64,
     pub slab: usize,
@@ -924,7 +925,7 @@ impl<P: PairVectors, E: Real> Work for BoundSlope<'_, P, E> {
 /// dj/dt by D^j (56, 59); power that it dissipates in the slab.
 pub(super) struct VolumeRates<'a, P, E: Real> {
     pub pairs: P,
-    pub input: ForceInput<'a, E>,
+    pub input: ForceInput<'a, E, f64>,
     pub sigma: &'a [f64],
     pub slope: [&'a [f64]; 3],
     pub j_chi: Option<&'a [f64]>,

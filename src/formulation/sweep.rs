@@ -326,8 +326,6 @@ pub trait PairReal: ReferenceReal {
     fn own(layout: Layout) -> Self::Own;
     /// Takes over a new state.
     fn take(own: &mut Self::Own, state: &State);
-    /// x and v.
-    fn motion<'a>(own: &'a Self::Own, state: &'a State) -> [[&'a [Self]; 3]; 2];
     /// Where forces are summed, given where they are wanted, and x and v.
     fn sums<'a>(
         own: &'a mut Self::Own,
@@ -345,15 +343,12 @@ impl PairReal for f64 {
     type Own = ();
     fn own(_: Layout) {}
     fn take((): &mut (), _: &State) {}
-    fn motion<'a>((): &'a (), state: &'a State) -> [[&'a [f64]; 3]; 2] {
-        [state.x.components(), state.v.components()]
-    }
     fn sums<'a>(
         (): &'a mut (),
         state: &'a State,
         force: &'a mut Array<3>,
     ) -> (&'a mut Array<3>, [[&'a [f64]; 3]; 2]) {
-        (force, Self::motion(&(), state))
+        (force, [state.x.components(), state.v.components()])
     }
     fn hand_over((): &(), _: &mut Array<3>) {}
     fn bytes((): &()) -> usize {
@@ -398,9 +393,6 @@ impl PairReal for f32 {
                 });
             }
         });
-    }
-    fn motion<'a>(own: &'a Rounded, _: &'a State) -> [[&'a [f32]; 3]; 2] {
-        [own.x.components(), own.v.components()]
     }
     fn sums<'a>(
         own: &'a mut Rounded,
@@ -714,12 +706,16 @@ impl<E: PairReal> Sweep<E> {
     ///
     /// # Panics
     /// Where such passes were not asked for.
-    pub fn input<'a>(&'a self, state: &'a State, reference: &'a Reference) -> ForceInput<'a, E> {
+    pub fn input<'a>(
+        &'a self,
+        state: &'a State,
+        reference: &'a Reference,
+    ) -> ForceInput<'a, E, f64> {
         let Store::Whole(block) = &self.store else {
             unreachable!("the block of the whole body is kept for them");
         };
-        let PairData { slices, .. } = E::pairs(reference);
-        ForceInput::new(E::motion(&self.own, state), reference, slices, block)
+        let motion = [state.x.components(), state.v.components()];
+        ForceInput::new(motion, reference, E::pairs(reference).slices, block)
     }
 
     /// Whether passes over all neighbours may follow, which read pairs in double precision.

@@ -319,6 +319,45 @@ impl Url {
         }
     }
 
+    /// Whether sums over pairs are formed of numbers that their precision holds; what does not, and its
+    /// size, where they are not.
+    pub fn check_range(
+        &self,
+        reference: &Reference,
+    ) -> std::result::Result<(), (&'static str, f64)> {
+        // Single precision holds 1e-38 to 3e38. This leaves room for jumps of a hundred-millionth of the wave speed, and
+        // above for whatever large strains make of a stress.
+        const RANGE: std::ops::Range<f64> = 1e-29..1e32;
+        if matches!(self.sweep, Sweeps::Double(_)) {
+            return Ok(());
+        }
+        let volume = reference.volume.components()[0];
+        let particles = reference.layout.particles as f64;
+        let h2 = (volume.iter().sum::<f64>() / particles).powf(2.0 / 3.0);
+        let (c, rho) = (self.wave_speeds().pressure, self.law.density());
+        let formed = [
+            ("the fourth power of the spacing [m^4]", h2 * h2),
+            (
+                "density times the fourth power of the spacing [kg m]",
+                rho * h2 * h2,
+            ),
+            (
+                "density times the square of the wave speed [Pa]",
+                rho * c * c,
+            ),
+            (
+                "the force on a particle at a strain of one [N]",
+                rho * c * c * h2,
+            ),
+            (
+                "the square of the wave speed over the spacing [1/s^2]",
+                c * c / h2,
+            ),
+        ];
+        let outside = formed.into_iter().find(|(_, size)| !RANGE.contains(size));
+        outside.map_or(Ok(()), Err)
+    }
+
     /// Wave speeds of the linearised law [m/s]: adiabatic with heat.
     pub fn wave_speeds(&self) -> WaveSpeeds<f64> {
         let thermal = self.options.thermal;
