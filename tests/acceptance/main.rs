@@ -16,6 +16,7 @@ mod homogeneous;
 mod irregular;
 mod metals;
 mod numerics;
+mod precision;
 mod punch;
 mod reproducibility;
 mod slab_heating;

@@ -99,6 +99,24 @@ const VARIANTS: &[(&str, &[&str])] = &[
         ],
     ),
     ("l_block", &[]),
+    ("column_twisting", &["numerics.precision=single"]),
+    (
+        "column_bending",
+        &[
+            JITTERED[0],
+            "numerics.precision=single",
+            "numerics.kernel_option=3",
+            "numerics.reference_update={\"every\": 3}",
+        ],
+    ),
+    (
+        "swinging_cube",
+        &[
+            "numerics.precision=single",
+            "numerics.state=fhj",
+            "numerics.volume_dissipation=0.05",
+        ],
+    ),
     ("elastic_cube", &["numerics.neighbours={\"radius\": 2.1}"]),
     ("swinging_cube", &[]),
     (
