@@ -17,6 +17,8 @@ pub struct Layout {
     pub slots: usize,
     /// Slots per slab, the unit of parallel work and of partial sums: whole slices, too.
     pub slab: usize,
+    /// Slots before the first one that holds a particle.
+    guard: usize,
 }
 
 impl Layout {
@@ -28,6 +30,14 @@ impl Layout {
             particles,
             slots: particles.max(1).next_multiple_of(LONG_SLICE),
             slab: ((slices / 256).clamp(8, 256) * SLICE).next_multiple_of(LONG_SLICE),
+            guard: Self::FIRST,
+        }
+    }
+    /// The same for so many slots of which none is read outside, without guards.
+    pub fn unguarded(slots: usize) -> Self {
+        Self {
+            guard: 0,
+            ..Self::new(slots)
         }
     }
     /// First slot: guard slots come before, a slice of any precision.
@@ -50,13 +60,13 @@ impl Layout {
         (Self::FIRST + first, each.min(self.slots - first))
     }
     /// Slots with the guards before and after them.
-    fn guarded(&self) -> usize {
-        Self::FIRST + self.slots + Self::FIRST
+    fn guarded<E: Real>(&self) -> usize {
+        self.guard + self.slots + self.guard.min(E::SLICE)
     }
     /// Slices from one component to the next. A distance that is a multiple of 4 kB would map all
     /// components of a particle to the same cache set.
     fn stride<E: Real>(&self) -> usize {
-        let stride = self.guarded() / E::SLICE;
+        let stride = self.guarded::<E>() / E::SLICE;
         if stride.is_multiple_of(64) {
             stride + 1
         } else {
@@ -90,13 +100,14 @@ impl<const N: usize, E: Real> Array<N, E> {
                 particles: 0,
                 slots: 0,
                 slab: LONG_SLICE,
+                guard: 0,
             },
         }
     }
     /// The components, each with its guards: index them with a slot.
     #[inline(always)]
     pub fn components(&self) -> [&[E]; N] {
-        let (stride, length) = (self.component_stride(), self.layout.guarded());
+        let (stride, length) = (self.component_stride(), self.layout.guarded::<E>());
         let all = self.flat();
         std::array::from_fn(|c| &all[c * stride..c * stride + length])
     }
@@ -141,13 +152,13 @@ impl<const N: usize, E: Real> Array<N, E> {
     }
     /// The same in pieces of another number of slots.
     pub fn pieces_mut(&mut self, each: usize) -> Vec<[&mut [E]; N]> {
-        let Layout { slots, .. } = self.layout;
+        let Layout { slots, guard, .. } = self.layout;
         let stride = self.component_stride();
         let mut pieces: [_; N] = {
             let mut components = self.flat_mut().chunks_exact_mut(stride);
             std::array::from_fn(|_| {
                 let component = components.next().expect("N components");
-                component[Layout::FIRST..Layout::FIRST + slots].chunks_mut(each)
+                component[guard..guard + slots].chunks_mut(each)
             })
         };
         (0..slots.div_ceil(each))
@@ -157,26 +168,26 @@ impl<const N: usize, E: Real> Array<N, E> {
     /// Some slots, counted from the first one that holds a particle.
     pub fn part(&self, slots: Range<usize>) -> [&[E]; N] {
         let (all, stride) = (self.flat(), self.component_stride());
+        let guard = self.layout.guard;
         std::array::from_fn(|c| {
-            let first = c * stride + Layout::FIRST;
+            let first = c * stride + guard;
             &all[first + slots.start..first + slots.end]
         })
     }
     /// The same to write.
     pub fn part_mut(&mut self, slots: Range<usize>) -> [&mut [E]; N] {
-        let stride = self.component_stride();
+        let (guard, stride) = (self.layout.guard, self.component_stride());
         let mut components = self.flat_mut().chunks_exact_mut(stride);
         std::array::from_fn(|_| {
             let component = components.next().expect("N components");
-            &mut component[Layout::FIRST + slots.start..Layout::FIRST + slots.end]
+            &mut component[guard + slots.start..guard + slots.end]
         })
     }
     /// Repeats the first slice that holds particles in the slots from `at` on.
     pub fn repeat_first(&mut self, at: usize) {
-        let stride = self.component_stride();
+        let (guard, stride) = (self.layout.guard, self.component_stride());
         for component in self.flat_mut().chunks_exact_mut(stride) {
-            let first = Layout::FIRST..Layout::FIRST + E::SLICE;
-            component.copy_within(first, Layout::FIRST + at);
+            component.copy_within(guard..guard + E::SLICE, guard + at);
         }
     }
     /// Sets every slot, guards included.

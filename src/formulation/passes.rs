@@ -408,7 +408,7 @@ impl<'a, E: Real, X: Real> ForceInput<'a, E, X> {
             s: tensors(&block.s),
             half_grad: tensors(&block.half_grad),
             wave: block.wave.components(),
-            first: Layout::FIRST,
+            first: 0,
             mask: usize::MAX,
         }
     }
@@ -425,8 +425,7 @@ impl<'a, E: Real, X: Real> ForceInput<'a, E, X> {
     /// Place of a slot in q, s, half_grad and wave.
     #[inline(always)]
     fn place(&self, slot: usize) -> usize {
-        // A lane without a neighbour may stand before the first particle.
-        (slot.wrapping_sub(self.first) & self.mask).wrapping_add(Layout::FIRST)
+        slot.wrapping_sub(self.first) & self.mask
     }
 
     /// The same, and pair vectors, made to show that what a mode reads holds as many slots: one check of

@@ -671,7 +671,8 @@ impl<E: PairReal> Sweep<E> {
         let reach = E::pairs(reference).slices.reach().max(E::SLICE);
         let reaches = (layout.slots / (CHUNKS * reach)).clamp(REACHES.0, REACHES.1);
         let each = (reaches * reach).max(layout.slab);
-        let block = |slots: usize| Block::new(Layout::new(slots), needs.areas, needs.gradients);
+        let block =
+            |slots: usize| Block::new(Layout::unguarded(slots), needs.areas, needs.gradients);
         let chunks = layout.slots.div_ceil(each);
         let store = if needs.whole {
             Store::Whole(Block::new(layout, needs.areas, needs.gradients))
