@@ -7,6 +7,7 @@ mod heat;
 mod laws;
 pub mod limiter;
 mod passes;
+mod precision;
 pub mod riemann;
 pub mod staleness;
 mod sweep;

@@ -1,4 +1,4 @@
-//! The order in which an evaluation goes through the body.
+//! The order in which an evaluation goes through the body, in either [precision](super::precision).
 //!
 //! The force on a particle needs what the point pass finds of all its neighbours: stress, area,
 //! gradient, wave, 29 numbers. Where nothing else reads them they are found just ahead of the
@@ -14,19 +14,16 @@ use std::ops::Range;
 
 use super::laws::{LawInputs, stresses};
 use super::passes::{
-    Bound, Dissipated, ForceInput, Forces, Gradient, Kept, Limit, Motion, PointOutput, Points,
-    Sums, lanes_from,
+    Bound, Dissipated, ForceInput, Forces, Gradient, Kept, Limit, Motion, PointOutput, Points, Sums,
 };
+use super::precision::PairReal;
 use super::riemann::{self, WaveSpeeds};
 use super::url::{Breakdown, Evaluation, Runner, State};
-use crate::lane::{Precise, Real, Work, vectorised};
+use crate::lane::Real;
 use crate::layout::{Array, Layout};
 use crate::material::{Law, with_law};
-use crate::math::*;
 use crate::parallel::{self, PerThread};
-use crate::reference::{
-    PairData, PairVectors, Pairs, Reference, ReferenceReal, Slices, load3, store3, with_pairs,
-};
+use crate::reference::{PairData, PairVectors, Pairs, Reference, Slices, with_pairs};
 
 /// Slots that a pass does at a time: few enough that what the next pass reads is still in a near cache, enough to
 /// make the bookkeeping negligible.
@@ -208,7 +205,7 @@ pub(super) struct Sweep<E: PairReal> {
     layout: Layout,
     store: Store<E>,
     ends: Ends<E>,
-    own: E::Own,
+    copies: E::Copies,
     /// grad_chi v [1/s], reference.
     pub grad_v: Array<9, E>,
 }
@@ -315,125 +312,6 @@ impl Outputs<'_> {
                 theta: theta.as_mut().and_then(Iterator::next),
             })
             .collect()
-    }
-}
-
-/// A precision in which the pair passes run.
-pub trait PairReal: ReferenceReal {
-    /// What a body has of its own in this precision.
-    type Own: std::fmt::Debug + Send + Sync;
-    /// Of a body.
-    fn own(layout: Layout) -> Self::Own;
-    /// Takes over a new state.
-    fn take(own: &mut Self::Own, state: &State);
-    /// Where forces are summed, given where they are wanted, and x and v.
-    fn sums<'a>(
-        own: &'a mut Self::Own,
-        state: &'a State,
-        force: &'a mut Array<3>,
-    ) -> (&'a mut Array<3, Self>, [[&'a [Self]; 3]; 2]);
-    /// Hands the sums over.
-    fn hand_over(own: &Self::Own, force: &mut Array<3>);
-    /// Bytes held.
-    fn bytes(own: &Self::Own) -> usize;
-}
-
-/// The state itself.
-impl PairReal for f64 {
-    type Own = ();
-    fn own(_: Layout) {}
-    fn take((): &mut (), _: &State) {}
-    fn sums<'a>(
-        (): &'a mut (),
-        state: &'a State,
-        force: &'a mut Array<3>,
-    ) -> (&'a mut Array<3>, [[&'a [f64]; 3]; 2]) {
-        (force, [state.x.components(), state.v.components()])
-    }
-    fn hand_over((): &(), _: &mut Array<3>) {}
-    fn bytes((): &()) -> usize {
-        0
-    }
-}
-
-/// Copies in single precision.
-#[derive(Debug)]
-pub struct Rounded {
-    /// x and v less those of a particle in the middle: the differences of neighbours, which are all that pairs
-    /// need, are then good to the round-off of the body's size and of the speeds within it.
-    x: Array<3, f32>,
-    v: Array<3, f32>,
-    force: Array<3, f32>,
-}
-
-impl PairReal for f32 {
-    type Own = Rounded;
-    fn own(layout: Layout) -> Rounded {
-        let zeros = || Array::new(layout, [0.0; 3]);
-        Rounded {
-            x: zeros(),
-            v: zeros(),
-            force: zeros(),
-        }
-    }
-    fn take(own: &mut Rounded, state: &State) {
-        let layout = state.x.layout();
-        let middle = Layout::slot(layout.particles / 2);
-        let (x, v) = (state.x.components(), state.v.components());
-        let origins = [state.x.get(middle), state.v.get(middle)];
-        let slabs = std::iter::zip(own.x.slabs_mut(), own.v.slabs_mut()).collect();
-        parallel::map_slabs(slabs, |slab, (to_x, to_v)| {
-            let run = layout.slab_range(slab);
-            for (from, origin, to) in [(x, origins[0], to_x), (v, origins[1], to_v)] {
-                vectorised(Round {
-                    from,
-                    origin,
-                    run,
-                    to,
-                });
-            }
-        });
-    }
-    fn sums<'a>(
-        own: &'a mut Rounded,
-        _: &'a State,
-        _: &'a mut Array<3>,
-    ) -> (&'a mut Array<3, f32>, [[&'a [f32]; 3]; 2]) {
-        (&mut own.force, [own.x.components(), own.v.components()])
-    }
-    fn hand_over(own: &Rounded, force: &mut Array<3>) {
-        let (layout, from) = (force.layout(), own.force.components());
-        parallel::map_slabs(force.slabs_mut(), |slab, to| {
-            vectorised(Round {
-                from,
-                origin: [0.0; 3],
-                run: layout.slab_range(slab),
-                to,
-            });
-        });
-    }
-    fn bytes(own: &Rounded) -> usize {
-        own.x.bytes() + own.v.bytes() + own.force.bytes()
-    }
-}
-
-/// Copies vectors, less an origin, in another precision.
-struct Round<'a, E, F> {
-    from: [&'a [E]; 3],
-    origin: [f64; 3],
-    run: (usize, usize),
-    to: [&'a mut [F]; 3],
-}
-
-impl<E: Real, F: Real> Work for Round<'_, E, F> {
-    type Output = ();
-    #[inline(always)]
-    fn run<T: Precise>(mut self, token: T::Token) {
-        let origin = self.origin.map(|o| T::splat(token, o));
-        for (at, a) in lanes_from::<T>(self.run) {
-            let v = load3::<T>(token, &self.from, a);
-            store3(&sub3(v, origin), &mut self.to, at);
-        }
     }
 }
 
@@ -698,7 +576,7 @@ impl<E: PairReal> Sweep<E> {
                 reach,
                 behind: vec![E::slots(0.0); chunks * 3 * reach / E::SLICE],
             },
-            own: E::own(layout),
+            copies: E::copies(layout),
             grad_v: Array::new(layout, [0.0; 9]),
         }
     }
@@ -740,13 +618,13 @@ impl<E: PairReal> Sweep<E> {
         let Self {
             layout,
             ends,
-            own,
+            copies,
             grad_v,
             ..
         } = self;
         let (layout, each, reach) = (*layout, ends.each, ends.reach);
-        E::take(own, task.state);
-        let (sums, motion) = E::sums(own, task.state, force);
+        E::take(copies, task.state);
+        let (sums, motion) = E::sums(copies, task.state, force);
         let PairData { slices, vectors, l } = E::pairs(task.reference);
         let passes = Passes {
             task,
@@ -799,7 +677,7 @@ impl<E: PairReal> Sweep<E> {
             }
         };
         ends.add(sums);
-        E::hand_over(own, force);
+        E::hand_over(copies, force);
         Ok(total)
     }
 
@@ -814,7 +692,7 @@ impl<E: PairReal> Sweep<E> {
         };
         blocks
             + std::mem::size_of_val(&self.ends.behind[..])
-            + E::bytes(&self.own)
+            + E::bytes(&self.copies)
             + self.grad_v.bytes()
     }
 }
