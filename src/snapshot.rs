@@ -1,5 +1,9 @@
 //! Snapshots: the complete state in memory, and as bytes with a version and a checksum.
 
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use crate::boundary::{InputValues, WallState};
@@ -9,6 +13,7 @@ use crate::layout::{Array, Layout};
 use crate::ledger::Accounts;
 use crate::material::VIRGIN;
 use crate::math::{IDENTITY, flat};
+use crate::output::{io_error, replace_file_durably};
 use crate::reference::Updated;
 use crate::scene::Scene;
 
@@ -152,6 +157,43 @@ impl Snapshot {
         let sum = xxh3_64(&writer.0);
         writer.0.extend_from_slice(&sum.to_le_bytes());
         writer.0
+    }
+
+    /// Writes the bytes to a file, under its name only when all of them are on the disk: neither a full disk nor a
+    /// killed process or a loss of power leaves half a file there, or takes away the one before.
+    ///
+    /// # Errors
+    /// [`Code::Io`] naming the file.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        let bytes = self.to_bytes();
+        replace_file_durably(path.as_ref(), |out| out.write_all(&bytes))
+    }
+
+    /// Reads a file that [`write`](Self::write) wrote.
+    ///
+    /// # Errors
+    /// [`Code::Io`] naming the file; [`Code::Snapshot`] as [`from_bytes`](Self::from_bytes).
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let failed = |cause: std::io::Error| io_error("read", path, &cause);
+        let file = File::open(path).map_err(failed)?;
+        let about = file.metadata().map_err(failed)?;
+        if !about.is_file() {
+            return Err(Error::new(
+                Code::Io,
+                format!("cannot read `{}`: it is no file", path.display()),
+            ));
+        }
+        let mut bytes = Vec::new();
+        let length = usize::try_from(about.len()).unwrap_or(usize::MAX);
+        bytes.try_reserve_exact(length).map_err(|_| {
+            Error::new(
+                Code::OutOfMemory,
+                format!("the snapshot `{}` has {length} bytes: more than there is memory for", path.display()),
+            )
+        })?;
+        file.take(about.len()).read_to_end(&mut bytes).map_err(failed)?;
+        Self::from_bytes(&bytes).map_err(|e| e.with_note(&format!("in {}", path.display())))
     }
 
     /// Reads what [`to_bytes`](Self::to_bytes) wrote.

@@ -1,8 +1,9 @@
 //! The command line as a user meets it: files, messages, exit statuses.
 #![cfg(feature = "cli")]
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -507,6 +508,129 @@ const FOR_ACCURACY: [&str; 7] = [
     "--of=probe.tip.displacement",
     "--tolerance",
 ];
+
+/// Everything that a run left in its folder, by name.
+fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = |folder: &Path| -> Vec<PathBuf> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|e| e.unwrap().path()).collect()
+    };
+    let all = files(folder).into_iter().chain(files(&folder.join("fields")));
+    all.filter(|path| path.is_file())
+        .map(|path| {
+            let name = path.strip_prefix(folder).unwrap();
+            (name.to_str().unwrap().to_owned(), fs::read(&path).unwrap())
+        })
+        .collect()
+}
+
+/// Killed at any moment, a run goes on from its last snapshot and leaves what it would have left.
+#[cfg(unix)]
+#[test]
+fn a_killed_run_goes_on_from_its_last_snapshot_and_leaves_the_same_files() {
+    let bench = Bench::new();
+    let scene = [
+        "scene.json",
+        "--set=geometry.box.spacing=0.2",
+        "--set=output.restart_interval=0.002",
+        "--set=numerics.angular_momentum_projection=true",
+        "--quiet",
+    ];
+    let until = |end: &str, folder: &str, more: &[&str]| {
+        let (end, folder) = (format!("--until={end}"), format!("--out={folder}"));
+        let own = [end.as_str(), folder.as_str()];
+        bench.command(&[&["run"], &scene[..], &own, more].concat())
+    };
+    let run = |folder: &str, more: &[&str]| until("0.099", folder, more);
+    assert!(run("whole", &[]).status().unwrap().success());
+    let whole = content(&bench.path("whole"));
+    let rows = |folder: &str| history(&bench.path(folder).join("history.csv")).1.len();
+
+    let mut kills = 0;
+    let mut more: &[&str] = &[];
+    loop {
+        let mut child = run("killed", more).spawn().unwrap();
+        // A little further each time, wherever that is: in a step, or while a file is written.
+        kills += 1;
+        let patience = Duration::from_millis(40 + 13 * kills);
+        let start = Instant::now();
+        while start.elapsed() < patience && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let done = child.try_wait().unwrap();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if bench.path("killed").join("restart.snapshot").exists() {
+            more = &["--restart"];
+        }
+        if let Some(status) = done {
+            assert!(status.success());
+            break;
+        }
+        assert!(kills < 200, "it does not get on: {} rows", rows("killed"));
+    }
+    println!("{kills} starts");
+    let again = content(&bench.path("killed"));
+    let names = |all: &BTreeMap<String, Vec<u8>>| all.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&again), names(&whole));
+    for (name, bytes) in &whole {
+        assert!(again[name] == *bytes, "{name} differs");
+    }
+
+    // A run that was complete can be made longer, and is then the longer run.
+    let longer = |folder: &str, more: &[&str]| {
+        assert!(until("0.12", folder, more).status().unwrap().success());
+        content(&bench.path(folder))
+    };
+    let (on, afresh) = (longer("killed", &["--restart"]), longer("longer", &[]));
+    for (name, bytes) in &afresh {
+        assert!(on[name] == *bytes, "{name} differs");
+    }
+}
+
+#[test]
+fn a_restart_needs_the_snapshot_of_its_own_run() {
+    let bench = Bench::new();
+    let message = bench.fails(1, &["run", "scene.json", "--out=none", "--restart"]);
+    assert!(message.contains("restart.snapshot"), "{message}");
+    let with = "--set=output.restart_interval=0.002";
+    bench.succeeds(&["run", "scene.json", "--out=out", with, "--quiet"]);
+    let before = content(&bench.path("out"));
+    let message = bench.fails(
+        1,
+        &["run", "scene.json", "--out=out", with, "--restart", "--set=material.neo_hookean.density=1000"],
+    );
+    assert!(message.contains("another scene"), "{message}");
+    let message = bench.fails(
+        1,
+        &["run", "scene.json", "--out=out", with, "--restart", "--set=probes.other=[0, 0, 0]"],
+    );
+    assert!(message.contains("other columns"), "{message}");
+    // Damaged in one bit, cut off, of another format, empty, not a file.
+    let path = bench.path("out").join("restart.snapshot");
+    let good = fs::read(&path).unwrap();
+    let mut damaged = vec![good[..good.len() / 2].to_vec(), Vec::new(), b"URLSPHSN".to_vec()];
+    for bit in (0..8 * good.len()).step_by(8 * good.len() / 97) {
+        let mut bytes = good.clone();
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        damaged.push(bytes);
+    }
+    for bytes in damaged {
+        fs::write(&path, bytes).unwrap();
+        let message = bench.fails(1, &["run", "scene.json", "--out=out", with, "--restart"]);
+        assert!(message.contains("restart.snapshot"), "{message}");
+    }
+    fs::remove_file(&path).unwrap();
+    fs::create_dir(&path).unwrap();
+    let message = bench.fails(1, &["run", "scene.json", "--out=out", with, "--restart"]);
+    assert!(message.contains("restart.snapshot"), "{message}");
+    fs::remove_dir(&path).unwrap();
+    fs::write(&path, &good).unwrap();
+    let after = content(&bench.path("out"));
+    assert!(after["history.csv"] == before["history.csv"], "a refused restart changes nothing");
+    bench.succeeds(&["run", "scene.json", "--out=out", with, "--restart", "--quiet"]);
+    assert!(content(&bench.path("out")) == before, "nothing is left to do");
+}
 
 #[test]
 fn accuracy_asked_for_is_predicted_run_and_reported() {

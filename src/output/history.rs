@@ -26,15 +26,43 @@ impl History {
         columns: impl IntoIterator<Item: AsRef<str>>,
     ) -> Result<Self> {
         let path = path.into();
-        let mut header = String::from("time");
-        let mut count = 0;
-        for name in columns {
-            header.push(',');
-            header.push_str(&quoted(name.as_ref()));
-            count += 1;
+        let (header, count) = header(columns);
+        Self::start(path, count, &header)
+    }
+
+    /// Goes on with a file that was written before, without the rows after `time`.
+    ///
+    /// # Errors
+    /// [`Code::Io`](crate::Code::Io) naming the file, if there is none;
+    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) if it has other columns.
+    pub fn resume(
+        path: impl Into<PathBuf>,
+        columns: impl IntoIterator<Item: AsRef<str>>,
+        time: f64,
+    ) -> Result<Self> {
+        let path = path.into();
+        let (header, count) = header(columns);
+        let text = std::fs::read_to_string(&path).map_err(|cause| io_error("read", &path, &cause))?;
+        if !text.starts_with(&header) {
+            return Err(Error::argument(format!(
+                "the history `{}` has other columns than this run: its probes or patches were others; start \
+                 the run afresh",
+                path.display()
+            )));
         }
-        header.push('\n');
-        replace_file(&path, |out| out.write_all(header.as_bytes()))?;
+        // The last row may have been cut off in the middle.
+        let whole = text[header.len()..].split_inclusive('\n');
+        let is_kept = |row: &&str| {
+            let number = row.split([',', '\n']).next().unwrap_or_default();
+            row.ends_with('\n') && number.parse::<f64>().is_ok_and(|t| t <= time)
+        };
+        let kept: String = whole.take_while(is_kept).collect();
+        Self::start(path, count, &(header + &kept))
+    }
+
+    /// A file with this content, to be appended to.
+    fn start(path: PathBuf, columns: usize, content: &str) -> Result<Self> {
+        replace_file(&path, |out| out.write_all(content.as_bytes()))?;
         let file = OpenOptions::new()
             .append(true)
             .open(&path)
@@ -42,7 +70,7 @@ impl History {
         Ok(Self {
             path,
             file,
-            columns: count,
+            columns,
         })
     }
 
@@ -76,6 +104,19 @@ impl History {
     pub fn path(&self) -> &Path {
         &self.path
     }
+}
+
+/// The first line, and how many columns there are besides the time.
+fn header(columns: impl IntoIterator<Item: AsRef<str>>) -> (String, usize) {
+    let mut header = String::from("time");
+    let mut count = 0;
+    for name in columns {
+        header.push(',');
+        header.push_str(&quoted(name.as_ref()));
+        count += 1;
+    }
+    header.push('\n');
+    (header, count)
 }
 
 /// A name as a CSV field (RFC 4180): quoted if it holds a separator, a quote or a line end.
@@ -121,6 +162,31 @@ mod tests {
             assert_eq!(read, written);
         }
         assert_eq!(lines.next(), None);
+    }
+
+    #[test]
+    fn a_file_goes_on_where_a_time_ends() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("history.csv");
+        let mut history = History::create(&path, ["a"]).unwrap();
+        for time in [0.0, 0.1, 0.2, 0.3] {
+            history.append(time, &[10.0 * time]).unwrap();
+        }
+        drop(history);
+        // A row that a killed process did not finish.
+        let mut text = std::fs::read_to_string(&path).unwrap();
+        text += "0.1";
+        std::fs::write(&path, text).unwrap();
+        let mut history = History::resume(&path, ["a"], 0.1).unwrap();
+        history.append(0.15, &[7.0]).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(&path).unwrap(),
+            "time,a\n0.0,0.0\n0.1,1.0\n0.15,7.0\n"
+        );
+        let error = History::resume(&path, ["b"], 0.1).unwrap_err();
+        assert_eq!(error.code(), Code::InvalidArgument, "{error}");
+        let error = History::resume(folder.path().join("none.csv"), ["a"], 0.1).unwrap_err();
+        assert_eq!(error.code(), Code::Io, "{error}");
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod vtu;
 
 pub use history::History;
 pub use recorder::Recorder;
+pub use recorder::RESTART;
 pub(crate) use recorder::{ACCURACY, ROUNDING, history_interval};
 pub use vtu::{Collection, write_vtu};
 
@@ -25,6 +26,28 @@ pub fn replace_file(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<()> {
+    replace(path, write, |_| Ok(()))
+}
+
+/// The same for a file that is to outlive a loss of power: it is on the disk before it takes its name.
+pub(crate) fn replace_file_durably(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<()> {
+    replace(path, write, File::sync_all)?;
+    // The name is on the disk with its folder. Where folders cannot be opened, or synchronised, it follows later.
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
+}
+
+fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    finish: impl FnOnce(&File) -> io::Result<()>,
+) -> Result<()> {
     let temporary = {
         let mut name = OsString::from(path);
         name.push(".part");
@@ -34,6 +57,7 @@ pub fn replace_file(
         let mut out = BufWriter::new(File::create(&temporary)?);
         write(&mut out)?;
         out.flush()?;
+        finish(out.get_ref())?;
         drop(out);
         fs::rename(&temporary, path)
     };
@@ -45,7 +69,7 @@ pub fn replace_file(
 }
 
 /// An input/output error that names the file and what was to be done with it.
-fn io_error(action: &str, path: &Path, cause: &io::Error) -> Error {
+pub(crate) fn io_error(action: &str, path: &Path, cause: &io::Error) -> Error {
     let remedy = match cause.kind() {
         io::ErrorKind::NotFound => "; does the folder exist?",
         io::ErrorKind::PermissionDenied => "; is the folder writable?",

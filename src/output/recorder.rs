@@ -20,7 +20,7 @@ pub(crate) fn history_interval(scene: &Scene) -> f64 {
     own.unwrap_or(scene.time.end / DEFAULT_ROWS)
 }
 
-/// Writes `history.csv`, `fields.pvd`, `fields/*.vtu` and `scene.json` into a folder.
+/// Writes `history.csv`, `fields.pvd`, `fields/*.vtu`, `restart.snapshot` and `scene.json` into a folder.
 ///
 /// ```no_run
 /// # fn main() -> urlsph::Result<()> {
@@ -45,6 +45,18 @@ pub struct Recorder {
     history_schedule: Schedule,
     fields: Vec<Field>,
     field_files: Option<FieldFiles>,
+    restarts: Option<Schedule>,
+    /// Whether the scene's end has been written.
+    finished: bool,
+}
+
+/// What is in the folder already.
+#[derive(Clone, Copy, PartialEq)]
+enum Before {
+    /// Another run, which is replaced.
+    Another,
+    /// The beginning of this one.
+    Beginning,
 }
 
 #[derive(Debug)]
@@ -61,12 +73,36 @@ impl Recorder {
     /// [`Code::Io`](crate::Code::Io) naming the file or folder,
     /// [`Code::InvalidScene`](crate::Code::InvalidScene) for a field that there is not.
     pub fn create(folder: impl Into<PathBuf>, simulation: &Simulation) -> Result<Self> {
-        let folder = folder.into();
+        Self::open(folder.into(), simulation, Before::Another)
+    }
+
+    /// Goes on in the folder of a run that ended early, from the state of its [`RESTART`] file, which `simulation` has
+    /// been restored to: what the folder has of later times is removed, and the files become those of a
+    /// run that was never interrupted.
+    ///
+    /// ```no_run
+    /// # fn main() -> urlsph::Result<()> {
+    /// # let scene = urlsph::Scene::from_json("{}", &[])?;
+    /// use urlsph::{Simulation, Snapshot, output::{RESTART, Recorder}};
+    /// let mut simulation = Simulation::new(scene)?;
+    /// simulation.restore(&Snapshot::read(std::path::Path::new("out").join(RESTART))?)?;
+    /// let mut recorder = Recorder::resume("out", &simulation)?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`create`](Self::create); [`Code::Io`](crate::Code::Io) if a file of the run is missing,
+    /// [`Code::InvalidArgument`](crate::Code::InvalidArgument) if its history has other columns.
+    pub fn resume(folder: impl Into<PathBuf>, simulation: &Simulation) -> Result<Self> {
+        Self::open(folder.into(), simulation, Before::Beginning)
+    }
+
+    fn open(folder: PathBuf, simulation: &Simulation, before: Before) -> Result<Self> {
         let scene = simulation.scene();
         let fields = selected_fields(simulation)?;
         let field_folder = folder.join("fields");
         fs::create_dir_all(&folder).map_err(|cause| io_error("create", &folder, &cause))?;
-        remove_earlier(&folder, &field_folder)?;
 
         let resolved = serde_json::to_string_pretty(scene).map_err(|cause| {
             Error::argument(format!("the scene does not turn into JSON: {cause}"))
@@ -77,19 +113,38 @@ impl Recorder {
 
         let time = simulation.time();
         let variables = variables::outputs(simulation);
-        let history = History::create(
-            folder.join("history.csv"),
-            variables.iter().flat_map(OutputVariable::element_names),
-        )?;
-        let interval = history_interval(scene);
+        let columns = variables.iter().flat_map(OutputVariable::element_names);
+        let path = folder.join("history.csv");
+        // The snapshot is the last file of its instant: the others have been written.
+        let schedule = |interval: f64| {
+            let mut schedule = Schedule::new(interval, time);
+            if before == Before::Beginning {
+                schedule.take(time);
+            }
+            schedule
+        };
+        let history = match before {
+            Before::Another => History::create(path, columns)?,
+            Before::Beginning => History::resume(path, columns, time)?,
+        };
+        if before == Before::Another {
+            remove_earlier(&folder)?;
+        }
         let field_files = match scene.output.field_interval {
             Some(interval) => {
                 fs::create_dir_all(&field_folder)
                     .map_err(|cause| io_error("create", &field_folder, &cause))?;
+                let pvd = folder.join("fields.pvd");
+                let collection = match before {
+                    Before::Another => Collection::create(pvd)?,
+                    Before::Beginning => Collection::resume(pvd, time)?,
+                };
+                let written = collection.len();
+                remove_states(&field_folder, written)?;
                 Some(FieldFiles {
-                    schedule: Schedule::new(interval, time),
-                    collection: Collection::create(folder.join("fields.pvd"))?,
-                    written: 0,
+                    schedule: schedule(interval),
+                    collection,
+                    written,
                 })
             }
             None => None,
@@ -97,9 +152,11 @@ impl Recorder {
         Ok(Self {
             end: scene.time.end,
             time,
-            variables,
             history,
-            history_schedule: Schedule::new(interval, time),
+            history_schedule: schedule(history_interval(scene)),
+            restarts: scene.output.restart_interval.map(schedule),
+            finished: before == Before::Beginning && time >= scene.time.end,
+            variables,
             fields,
             field_files,
             folder,
@@ -115,7 +172,8 @@ impl Recorder {
             .field_files
             .as_ref()
             .map_or(f64::INFINITY, |files| files.schedule.next());
-        let due = self.history_schedule.next().min(fields);
+        let restarts = self.restarts.as_ref().map_or(f64::INFINITY, Schedule::next);
+        let due = self.history_schedule.next().min(fields).min(restarts);
         // An instant that misses the end by rounding would cost a vanishing last step.
         Some(if due > self.end - ROUNDING * self.end {
             self.end
@@ -130,7 +188,8 @@ impl Recorder {
     /// [`Code::Io`](crate::Code::Io) naming the file. The simulation is only read.
     pub fn record(&mut self, simulation: &Simulation) -> Result<()> {
         self.time = simulation.time();
-        let end = self.time >= self.end;
+        let end = self.time >= self.end && !self.finished;
+        self.finished |= end;
         if self.history_schedule.take(self.time) || end {
             self.write_row(simulation)?;
         }
@@ -141,6 +200,12 @@ impl Recorder {
             write_vtu(&self.folder.join(&name), simulation, &self.fields)?;
             files.collection.add(self.time, &name)?;
             files.written += 1;
+        }
+        // Last, because a run that goes on from it expects the other files of its time.
+        if let Some(restarts) = &mut self.restarts
+            && (restarts.take(self.time) || end)
+        {
+            simulation.snapshot().write(self.folder.join(RESTART))?;
         }
         Ok(())
     }
@@ -179,21 +244,31 @@ impl Recorder {
 
 const STATE_FILE: &str = "state_";
 const LAST_STATE: &str = "last_good_state.vtu";
+/// Snapshot in a run's folder that the run can be continued from.
+pub const RESTART: &str = "restart.snapshot";
 /// What a run for an accuracy adds to the folder.
 pub(crate) const ACCURACY: &str = "accuracy.json";
 
-/// Removes the files of an earlier run that the new run would not overwrite: it may write fewer fields.
-fn remove_earlier(folder: &Path, field_folder: &Path) -> Result<()> {
-    let remove = |path: &Path| match fs::remove_file(path) {
+fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
         Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
             Err(io_error("remove", path, &cause))
         }
         _ => Ok(()),
-    };
-    remove(&folder.join("fields.pvd"))?;
-    remove(&folder.join(LAST_STATE))?;
-    remove(&folder.join(ACCURACY))?;
-    let Ok(entries) = fs::read_dir(field_folder) else {
+    }
+}
+
+/// Removes the files of another run that the new run would not overwrite: it may write fewer.
+fn remove_earlier(folder: &Path) -> Result<()> {
+    for name in ["fields.pvd", RESTART, LAST_STATE, ACCURACY] {
+        remove(&folder.join(name))?;
+    }
+    remove_states(&folder.join("fields"), 0)
+}
+
+/// Removes all field files but the first so many.
+fn remove_states(folder: &Path, first: usize) -> Result<()> {
+    let Ok(entries) = fs::read_dir(folder) else {
         return Ok(());
     };
     for entry in entries.flatten() {
@@ -202,7 +277,10 @@ fn remove_earlier(folder: &Path, field_folder: &Path) -> Result<()> {
             .to_str()
             .and_then(|name| name.strip_prefix(STATE_FILE)?.strip_suffix(".vtu"));
         // Only what this writer names so is its own to remove.
-        if number.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit())) {
+        let is_own = |n: &&str| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit());
+        if let Some(number) = number.filter(is_own)
+            && number.parse().is_ok_and(|n: usize| n >= first)
+        {
             remove(&entry.path())?;
         }
     }
@@ -276,12 +354,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let fields = folder.path().join("fields");
         fs::create_dir(&fields).unwrap();
-        for name in ["state_000007.vtu", "state_mine.vtu", "other.vtu"] {
+        for name in ["state_000001.vtu", "state_000007.vtu", "state_mine.vtu", "other.vtu"] {
             fs::write(fields.join(name), "").unwrap();
         }
         fs::write(folder.path().join("notes.txt"), "").unwrap();
-        remove_earlier(folder.path(), &fields).unwrap();
+        remove_states(&fields, 2).unwrap();
+        assert!(fields.join("state_000001.vtu").exists());
         assert!(!fields.join("state_000007.vtu").exists());
+        remove_earlier(folder.path()).unwrap();
+        assert!(!fields.join("state_000001.vtu").exists());
         assert!(fields.join("state_mine.vtu").exists());
         assert!(fields.join("other.vtu").exists());
         assert!(folder.path().join("notes.txt").exists());

@@ -6,7 +6,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::replace_file;
+use super::{io_error, replace_file};
 use crate::error::{Error, Result};
 use crate::fields::{Field, FieldInfo};
 use crate::simulation::Simulation;
@@ -153,6 +153,9 @@ pub struct Collection {
     entries: String,
 }
 
+/// Beginning of a line of the collection.
+const ENTRY: &str = "<DataSet timestep=\"";
+
 impl Collection {
     /// Writes an empty collection. An older file is replaced.
     ///
@@ -167,6 +170,40 @@ impl Collection {
         Ok(collection)
     }
 
+    /// Goes on with a collection that was written before, without what came after `time`.
+    ///
+    /// # Errors
+    /// [`Code::Io`](crate::Code::Io) naming the file.
+    pub fn resume(path: impl Into<PathBuf>, time: f64) -> Result<Self> {
+        let path = path.into();
+        let text = std::fs::read_to_string(&path).map_err(|cause| io_error("read", &path, &cause))?;
+        let is_kept = |line: &&str| {
+            let rest = line.trim_start().strip_prefix(ENTRY);
+            let number = rest.and_then(|rest| rest.split_once('"'));
+            number.is_some_and(|(number, _)| number.parse::<f64>().is_ok_and(|t| t <= time))
+        };
+        let mut collection = Self {
+            path,
+            entries: String::new(),
+        };
+        for line in text.lines().filter(is_kept) {
+            collection.entries += line;
+            collection.entries.push('\n');
+        }
+        collection.write()?;
+        Ok(collection)
+    }
+
+    /// Number of files.
+    pub fn len(&self) -> usize {
+        self.entries.lines().count()
+    }
+
+    /// Whether it has no files.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Adds a file, given by its path relative to the collection with `/` between folders.
     ///
     /// # Errors
@@ -178,7 +215,7 @@ impl Collection {
                 "the field file `{file}` has <, >, & or \" in its name; choose another"
             )));
         }
-        self.entries += &format!("    <DataSet timestep=\"{time:?}\" file=\"{file}\"/>\n");
+        self.entries += &format!("    {ENTRY}{time:?}\" file=\"{file}\"/>\n");
         self.write()
     }
 

@@ -107,6 +107,10 @@ pub struct Output {
     /// Interval of the field files [s]; without it no fields are written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field_interval: Option<f64>,
+    /// Interval of the snapshots from which a run can be continued [s], the last one in `restart.snapshot`;
+    /// without it none are written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub restart_interval: Option<f64>,
     /// Names of the fields; default: displacement, velocity, cauchy_stress, pressure, jacobian, and
     /// temperature and equivalent_plastic_strain where the scene has them.
     #[serde(skip_serializing_if = "Option::is_none")]

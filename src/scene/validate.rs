@@ -179,6 +179,7 @@ fn output(output: &Output) -> Result<()> {
     for (path, interval) in [
         ("output.history_interval", output.history_interval),
         ("output.field_interval", output.field_interval),
+        ("output.restart_interval", output.restart_interval),
     ] {
         if let Some(interval) = interval {
             positive(path, interval)?;

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use urlsph::output::Recorder;
-use urlsph::{Code, Control, Energies, Error, Progress, Result, Simulation};
+use urlsph::output::{RESTART, Recorder};
+use urlsph::{Code, Control, Energies, Error, Progress, Result, Simulation, Snapshot};
 
 use crate::SceneArguments;
 use crate::accuracy::{self, Accuracy};
@@ -28,6 +28,10 @@ pub struct Run {
     /// End of the run [s]: the same as `--set time.end=T`.
     #[arg(long, value_name = "T")]
     until: Option<String>,
+    /// Goes on with the run in the folder from its last snapshot (see `output.restart_interval`), up to the end that the
+    /// scene has now
+    #[arg(long, conflicts_with = "tolerance")]
+    restart: bool,
     /// Prints errors only.
     #[arg(long)]
     pub quiet: bool,
@@ -44,7 +48,13 @@ impl Run {
             return accuracy::execute(&self);
         }
         let mut simulation = Simulation::with_threads(self.scene.load()?, self.threads)?;
-        let mut recorder = Recorder::create(&self.out, &simulation)?;
+        let mut recorder = if self.restart {
+            let snapshot = Snapshot::read(self.out.join(RESTART))?;
+            simulation.restore(&snapshot)?;
+            Recorder::resume(&self.out, &simulation)?
+        } else {
+            Recorder::create(&self.out, &simulation)?
+        };
         let interrupted = watch_interrupts()?;
         let start = Instant::now();
         let initial = simulation.energies();
