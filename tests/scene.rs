@@ -566,7 +566,7 @@ fn bad_values_are_refused_with_their_place() {
         ("boundary.leg.x_min.support=roller", P, "boundary.leg.x_min", &["unknown key `x_min`", "see the override"]),
         ("numerics.reference_update=always", P, "numerics.reference_update", &["`never`, `every_step`, `every`, `when`"]),
         ("numerics.reference_update=every", P, "numerics.reference_update.every", &["needs a value"]),
-        ("numerics.precision=half", P, "numerics.precision", &["`double`, `single`"]),
+        ("numerics.precision=half", P, "numerics.precision", &["`double` or `single`"]),
         ("numerics.reference_update=3", P, "numerics.reference_update", &["one of `never`"]),
         ("initial.gradient=exact", S, "initial.gradient", &["no initial displacement"]),
         ("initial.gradient=analytic", P, "initial.gradient", &["`discrete` or `exact`"]),
