@@ -396,7 +396,7 @@ fn everything() -> Value {
             "neighbours": {"radius": 1.8}, "operators": "kernel", "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
             "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3,
-            "smallest_step": 0.01
+            "smallest_step": 0.01, "precision": "single"
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
@@ -566,6 +566,7 @@ fn bad_values_are_refused_with_their_place() {
         ("boundary.leg.x_min.support=roller", P, "boundary.leg.x_min", &["unknown key `x_min`", "see the override"]),
         ("numerics.reference_update=always", P, "numerics.reference_update", &["`never`, `every_step`, `every`, `when`"]),
         ("numerics.reference_update=every", P, "numerics.reference_update.every", &["needs a value"]),
+        ("numerics.precision=half", P, "numerics.precision", &["`double` or `single`"]),
         ("numerics.reference_update=3", P, "numerics.reference_update", &["one of `never`"]),
         ("initial.gradient=exact", S, "initial.gradient", &["no initial displacement"]),
         ("initial.gradient=analytic", P, "initial.gradient", &["`discrete` or `exact`"]),

@@ -24,7 +24,7 @@ def main(table, picture):
         ("bytes", "memory [bytes per particle]"),
     ]
     for ax, (column, label) in zip(axes, panels):
-        for body, marker in zip(bodies, "os^D"):
+        for body, marker in zip(bodies, "os^Dv"):
             own = [row for row in rows if row["body"] == body and row[column]]
             ax.plot(
                 [float(row["particles"]) for row in own],
