@@ -281,7 +281,7 @@ mod tests {
                     "numerics": {{{numerics}}}, "time": {{"end": 1}}}}"#
             );
             let scene = Scene::from_json(&text, &[]).expect("a good scene");
-            let bytes = scene.bytes().expect("it has a size");
+            let bytes = scene.memory().expect("it has a size");
             let simulation = Simulation::with_threads(scene, 1).expect("it can be set up");
             let ratio = bytes / simulation.memory() as f64;
             println!(

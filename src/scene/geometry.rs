@@ -426,10 +426,13 @@ fn read_file(path: &Path) -> Result<Vec<u8>> {
         Error::new(Code::Io, text)
     };
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(|e| failed(&e))?;
-    if file.metadata().is_ok_and(|m| m.is_dir()) {
-        return Err(failed(&"it is a folder"));
+    let about = std::fs::metadata(path).map_err(|e| failed(&e))?;
+    // Others have no end, or wait for somebody to write.
+    if !about.is_file() {
+        let what = if about.is_dir() { "a folder" } else { "a device or a pipe" };
+        return Err(failed(&format_args!("it is {what}")));
     }
+    let file = std::fs::File::open(path).map_err(|e| failed(&e))?;
     file.take(MOST + 1)
         .read_to_end(&mut bytes)
         .map_err(|e| failed(&e))?;
@@ -927,9 +930,12 @@ fn sizes(geometry: &Geometry, neighbours: Neighbours) -> Result<Vec<(f64, f64, S
 }
 
 impl Scene {
-    /// Memory that a simulation of this scene holds [bytes], foreseen.
-    #[cfg(test)]
-    pub(crate) fn bytes(&self) -> Result<f64> {
+    /// Memory that a simulation of this scene will hold [bytes], foreseen without setting it up; exact to a tenth for
+    /// lattices.
+    ///
+    /// # Errors
+    /// [`Code::InvalidScene`] for a geometry without a size.
+    pub fn memory(&self) -> Result<f64> {
         let sizes = sizes(&self.geometry, self.numerics.neighbours)?;
         let bytes = sizes
             .iter()
@@ -1001,7 +1007,7 @@ mod tests {
         }"#;
         let mut scene = Scene::from_json(text, &[]).unwrap();
         let pairs = 1331.0 * 18.0 * SETUP_BYTES_PER_PAIR;
-        let need = scene.bytes().unwrap() + 1331.0 * SETUP_BYTES_PER_PARTICLE.0 + pairs;
+        let need = scene.memory().unwrap() + 1331.0 * SETUP_BYTES_PER_PARTICLE.0 + pairs;
         capacity(&scene, None).unwrap();
         capacity(&scene, Some(need + 1.0)).unwrap();
         let error = capacity(&scene, Some(need - 1.0)).unwrap_err();

@@ -5,6 +5,7 @@ mod counts;
 mod demo;
 mod ffi_tests;
 mod fmu_tests;
+mod fuzz;
 mod header;
 mod install;
 mod output_tests;
@@ -32,6 +33,8 @@ Tasks:
               fields, histories and pictures under target/demo/
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
   fmu-tests   The tests of the FMUs from Python alone, and the thermal coupling of two FMUs
+  fuzz        [TARGET...] [--seconds N] [--minimise]: coverage-guided fuzzing of scene, mesh, snapshot, calls
+              and fmi (fuzz/README.md)
   header      Generate include/urlsph.h; with --check only see whether it is up to date
   install     --prefix DIR [--destdir DIR]: command line, library, headers, pkg-config and CMake
               files
@@ -62,6 +65,7 @@ fn run(arguments: &[String]) -> Result<()> {
         ["demo"] => demo::demo(&sh),
         ["ffi-tests"] => ffi_tests::run(&sh),
         ["fmu-tests"] => fmu_tests::run(&sh),
+        ["fuzz", arguments @ ..] => fuzz::fuzz(&sh, arguments),
         ["header"] => header::header(&sh, false),
         ["header", "--check"] => header::header(&sh, true),
         ["install", arguments @ ..] => install::install(&sh, arguments),

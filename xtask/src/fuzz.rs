@@ -1,0 +1,153 @@
+//! Coverage-guided fuzzing: `fuzz/README.md`.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use xshell::{Shell, cmd};
+
+use crate::tally::Tally;
+
+const TARGETS: [&str; 5] = ["scene", "mesh", "snapshot", "calls", "fmi"];
+
+/// Seconds of a target in the tests: enough to see that it runs, and to meet what a change has made easy to find.
+const IN_TESTS: u32 = 15;
+
+/// What cargo-fuzz sets, too, without a sanitizer; these options are stable.
+const INSTRUMENTS: &str = "-Cpasses=sancov-module \
+    -Cllvm-args=-sanitizer-coverage-level=4 \
+    -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
+    -Cllvm-args=-sanitizer-coverage-pc-table \
+    -Cllvm-args=-sanitizer-coverage-trace-compares \
+    --cfg fuzzing";
+
+struct Options {
+    targets: Vec<&'static str>,
+    seconds: u32,
+    minimise: bool,
+}
+
+impl Options {
+    fn read(arguments: &[&str]) -> Result<Self> {
+        let mut this = Self {
+            targets: Vec::new(),
+            seconds: 60,
+            minimise: false,
+        };
+        let mut rest = arguments.iter();
+        while let Some(argument) = rest.next() {
+            match (*argument, TARGETS.iter().find(|t| *t == argument)) {
+                (_, Some(target)) => this.targets.push(target),
+                ("--seconds", _) => {
+                    let seconds = rest.next().context("--seconds needs a number")?;
+                    this.seconds = seconds.parse().context("--seconds needs a number")?;
+                }
+                ("--minimise", _) => this.minimise = true,
+                (other, _) => bail!("there is no target {other}: give {}", TARGETS.join(", ")),
+            }
+        }
+        if this.targets.is_empty() {
+            this.targets = TARGETS.to_vec();
+        }
+        Ok(this)
+    }
+}
+
+pub fn fuzz(sh: &Shell, arguments: &[&str]) -> Result<()> {
+    let options = Options::read(arguments)?;
+    let programs = build(sh)?;
+    for target in &options.targets {
+        run(sh, &programs, target, options.seconds)?;
+        if options.minimise {
+            minimise(sh, &programs, target)?;
+        }
+    }
+    Ok(())
+}
+
+pub fn fuzz_tests(sh: &Shell) -> Result<Tally> {
+    let programs = build(sh)?;
+    let mut tally = Tally::default();
+    for target in TARGETS {
+        tally += Tally::of(run(sh, &programs, target, IN_TESTS));
+    }
+    Ok(tally)
+}
+
+/// Builds the targets with instruments, beside everything else; the folder of the programs.
+fn build(sh: &Shell) -> Result<PathBuf> {
+    let verbose = cmd!(sh, "rustc -vV").quiet().read()?;
+    let host = verbose.lines().find_map(|line| line.strip_prefix("host: "));
+    let host = host.context("rustc does not tell its host")?;
+    // With a target of its own the instruments stay out of build scripts and macros.
+    cmd!(
+        sh,
+        "cargo build --manifest-path fuzz/Cargo.toml --release --locked --target {host} --target-dir target/fuzz"
+    )
+    .env("RUSTFLAGS", INSTRUMENTS)
+    .run()?;
+    Ok(sh.current_dir().join(format!("target/fuzz/{host}/release")))
+}
+
+/// Runs a target from the committed inputs and those found before; an input that fails is kept and named.
+fn run(sh: &Shell, programs: &PathBuf, target: &str, seconds: u32) -> Result<()> {
+    println!("\n-- fuzz {target}, {seconds} s");
+    let found = format!("target/fuzz/found/{target}");
+    let failed = format!("target/fuzz/failed/{target}-");
+    let committed = format!("fuzz/corpus/{target}");
+    sh.create_dir(&found)?;
+    sh.create_dir("target/fuzz/failed")?;
+    sh.create_dir(&committed)?;
+    let seeds = seeds(sh, target)?;
+    let program = programs.join(target);
+    let dictionary = format!("fuzz/{target}.dict");
+    let dictionary = sh
+        .path_exists(&dictionary)
+        .then(|| format!("-dict={dictionary}"));
+    cmd!(
+        sh,
+        "{program} -max_total_time={seconds} -timeout=60 -rss_limit_mb=4096 -max_len=16384 -print_final_stats=1
+            -verbosity=0 -artifact_prefix={failed} {dictionary...} {found} {committed} {seeds}"
+    )
+    .run()
+    .with_context(|| {
+        format!("fuzzing {target} found an input that fails: it is in target/fuzz/failed; put it into {committed} \
+                 once it is mended")
+    })
+}
+
+/// Inputs that the repository has anyway.
+fn seeds(sh: &Shell, target: &str) -> Result<PathBuf> {
+    let folder = sh.current_dir().join(format!("target/fuzz/seeds/{target}"));
+    sh.remove_path(&folder)?;
+    sh.create_dir(&folder)?;
+    match target {
+        "scene" => {
+            for example in sh.read_dir("examples")? {
+                let scene = example.join("scene.json");
+                if let (true, Some(name)) = (scene.exists(), example.file_name()) {
+                    sh.copy_file(&scene, folder.join(name))?;
+                }
+            }
+        }
+        "mesh" => {
+            for mesh in sh.read_dir("examples/meshes")? {
+                if mesh.extension().is_some_and(|e| e == "msh") {
+                    sh.copy_file(&mesh, &folder)?;
+                }
+            }
+        }
+        _ => {}
+    }
+    Ok(folder)
+}
+
+/// Adds to the committed inputs what was found and reaches more.
+fn minimise(sh: &Shell, programs: &PathBuf, target: &str) -> Result<()> {
+    let program = programs.join(target);
+    cmd!(
+        sh,
+        "{program} -merge=1 -max_len=2048 -timeout=10 fuzz/corpus/{target} target/fuzz/found/{target}"
+    )
+    .run()?;
+    Ok(())
+}
