@@ -189,10 +189,15 @@ impl Snapshot {
         bytes.try_reserve_exact(length).map_err(|_| {
             Error::new(
                 Code::OutOfMemory,
-                format!("the snapshot `{}` has {length} bytes: more than there is memory for", path.display()),
+                format!(
+                    "the snapshot `{}` has {length} bytes: more than there is memory for",
+                    path.display()
+                ),
             )
         })?;
-        file.take(about.len()).read_to_end(&mut bytes).map_err(failed)?;
+        file.take(about.len())
+            .read_to_end(&mut bytes)
+            .map_err(failed)?;
         Self::from_bytes(&bytes).map_err(|e| e.with_note(&format!("in {}", path.display())))
     }
 

@@ -515,7 +515,9 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         let entries = fs::read_dir(folder).unwrap();
         entries.map(|e| e.unwrap().path()).collect()
     };
-    let all = files(folder).into_iter().chain(files(&folder.join("fields")));
+    let all = files(folder)
+        .into_iter()
+        .chain(files(&folder.join("fields")));
     all.filter(|path| path.is_file())
         .map(|path| {
             let name = path.strip_prefix(folder).unwrap();
@@ -531,7 +533,7 @@ fn a_killed_run_goes_on_from_its_last_snapshot_and_leaves_the_same_files() {
     let bench = Bench::new();
     let scene = [
         "scene.json",
-        "--set=geometry.box.spacing=0.2",
+        "--set=geometry.box.spacing=0.125",
         "--set=output.restart_interval=0.002",
         "--set=numerics.angular_momentum_projection=true",
         "--quiet",
@@ -598,18 +600,36 @@ fn a_restart_needs_the_snapshot_of_its_own_run() {
     let before = content(&bench.path("out"));
     let message = bench.fails(
         1,
-        &["run", "scene.json", "--out=out", with, "--restart", "--set=material.neo_hookean.density=1000"],
+        &[
+            "run",
+            "scene.json",
+            "--out=out",
+            with,
+            "--restart",
+            "--set=material.neo_hookean.density=1000",
+        ],
     );
     assert!(message.contains("another scene"), "{message}");
     let message = bench.fails(
         1,
-        &["run", "scene.json", "--out=out", with, "--restart", "--set=probes.other=[0, 0, 0]"],
+        &[
+            "run",
+            "scene.json",
+            "--out=out",
+            with,
+            "--restart",
+            "--set=probes.other=[0, 0, 0]",
+        ],
     );
     assert!(message.contains("other columns"), "{message}");
     // Damaged in one bit, cut off, of another format, empty, not a file.
     let path = bench.path("out").join("restart.snapshot");
     let good = fs::read(&path).unwrap();
-    let mut damaged = vec![good[..good.len() / 2].to_vec(), Vec::new(), b"URLSPHSN".to_vec()];
+    let mut damaged = vec![
+        good[..good.len() / 2].to_vec(),
+        Vec::new(),
+        b"URLSPHSN".to_vec(),
+    ];
     for bit in (0..8 * good.len()).step_by(8 * good.len() / 97) {
         let mut bytes = good.clone();
         bytes[bit / 8] ^= 1 << (bit % 8);
@@ -627,9 +647,22 @@ fn a_restart_needs_the_snapshot_of_its_own_run() {
     fs::remove_dir(&path).unwrap();
     fs::write(&path, &good).unwrap();
     let after = content(&bench.path("out"));
-    assert!(after["history.csv"] == before["history.csv"], "a refused restart changes nothing");
-    bench.succeeds(&["run", "scene.json", "--out=out", with, "--restart", "--quiet"]);
-    assert!(content(&bench.path("out")) == before, "nothing is left to do");
+    assert!(
+        after["history.csv"] == before["history.csv"],
+        "a refused restart changes nothing"
+    );
+    bench.succeeds(&[
+        "run",
+        "scene.json",
+        "--out=out",
+        with,
+        "--restart",
+        "--quiet",
+    ]);
+    assert!(
+        content(&bench.path("out")) == before,
+        "nothing is left to do"
+    );
 }
 
 #[test]

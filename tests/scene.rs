@@ -400,7 +400,7 @@ fn everything() -> Value {
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
-        "output": {"history_interval": 0.01, "field_interval": 0.1, "fields": ["velocity", "cauchy_stress"]}
+        "output": {"history_interval": 0.01, "field_interval": 0.1, "restart_interval": 0.05, "fields": ["velocity", "cauchy_stress"]}
     })
 }
 

@@ -75,20 +75,55 @@ impl Size {
 
 #[derive(Debug, Clone, Arbitrary)]
 enum Call {
-    Create { scene: u8, threads: Size, keep_error: bool },
+    Create {
+        scene: u8,
+        threads: Size,
+        keep_error: bool,
+    },
     CreateFromFile(Vec<u8>),
     Destroy,
-    Set { which: u8, patch: Size, values: [Number; 4], count: Size, missing: bool },
-    ReadInput { patch: Size, quantity: i32, room: Size },
+    Set {
+        which: u8,
+        patch: Size,
+        values: [Number; 4],
+        count: Size,
+        missing: bool,
+    },
+    ReadInput {
+        patch: Size,
+        quantity: i32,
+        room: Size,
+    },
     Step(Number),
     AdvanceTo(Number),
-    Callbacks { observing: bool },
-    Save { room: Option<Size> },
-    Restore { damage: Option<(u16, u8)>, size: Option<Size> },
-    Find { what: u8, name: Vec<u8> },
-    ReadField { field: Size, room: Size },
-    ReadPatch { what: u8, patch: Size, room: Size },
-    Ask { what: u8, index: Size, size: Size },
+    Callbacks {
+        observing: bool,
+    },
+    Save {
+        room: Option<Size>,
+    },
+    Restore {
+        damage: Option<(u16, u8)>,
+        size: Option<Size>,
+    },
+    Find {
+        what: u8,
+        name: Vec<u8>,
+    },
+    ReadField {
+        field: Size,
+        room: Size,
+    },
+    ReadPatch {
+        what: u8,
+        patch: Size,
+        room: Size,
+    },
+    Ask {
+        what: u8,
+        index: Size,
+        size: Size,
+    },
     View(Size),
 }
 
@@ -120,7 +155,10 @@ fn within<T: Copy + PartialEq + std::fmt::Debug>(
 ) -> urlsph_status {
     let mut buffer = vec![mark; room + 8];
     let status = call(buffer.as_mut_ptr());
-    assert!(buffer[room..].iter().all(|v| *v == mark), "written past the end");
+    assert!(
+        buffer[room..].iter().all(|v| *v == mark),
+        "written past the end"
+    );
     status
 }
 
@@ -148,8 +186,13 @@ impl Host {
     unsafe fn call(&self, s: *mut urlsph_simulation, call: &Call) -> urlsph_status {
         let mut index = 0_usize;
         match call {
-            Call::Create { scene, threads, keep_error } => {
-                let json = CString::new(SCENES[usize::from(*scene) % SCENES.len()]).expect("no NUL");
+            Call::Create {
+                scene,
+                threads,
+                keep_error,
+            } => {
+                let json =
+                    CString::new(SCENES[usize::from(*scene) % SCENES.len()]).expect("no NUL");
                 let options = urlsph_options {
                     overrides: null(),
                     override_count: 0,
@@ -208,7 +251,13 @@ impl Host {
                 unsafe { urlsph_destroy(s) };
                 urlsph_status::URLSPH_OK
             }
-            Call::Set { which, patch, values, count, missing } => {
+            Call::Set {
+                which,
+                patch,
+                values,
+                count,
+                missing,
+            } => {
                 let few: Vec<f64> = (0..ROOM).map(|i| values[i % 4].value()).collect();
                 let (data, count) = match missing {
                     true => (null(), count.value()),
@@ -224,7 +273,11 @@ impl Host {
                     _ => unsafe { urlsph_set_convection(s, patch, data, count, data, count) },
                 }
             }
-            Call::ReadInput { patch, quantity, room } => {
+            Call::ReadInput {
+                patch,
+                quantity,
+                room,
+            } => {
                 let room = room.at_most(ROOM);
                 within(room, f64::INFINITY, |values| unsafe {
                     urlsph_read_input(s, patch.value(), *quantity, values, room, &mut index)
@@ -258,7 +311,11 @@ impl Host {
                 status
             }
             Call::Restore { damage, size } => {
-                let mut bytes = self.snapshot.lock().expect("no panic while it is held").clone();
+                let mut bytes = self
+                    .snapshot
+                    .lock()
+                    .expect("no panic while it is held")
+                    .clone();
                 if let (Some((at, bits)), false) = (damage, bytes.is_empty()) {
                     let at = usize::from(*at) % bytes.len();
                     bytes[at] ^= bits;
@@ -267,8 +324,13 @@ impl Host {
                 unsafe { urlsph_restore_snapshot(s, bytes.as_ptr().cast(), size) }
             }
             Call::Find { what, name } => {
-                let name = CString::new(name.iter().filter(|b| **b != 0).copied().collect::<Vec<u8>>())
-                    .expect("no NUL");
+                let name = CString::new(
+                    name.iter()
+                        .filter(|b| **b != 0)
+                        .copied()
+                        .collect::<Vec<u8>>(),
+                )
+                .expect("no NUL");
                 let name = name.as_ptr();
                 match what % 4 {
                     0 => unsafe { urlsph_find_patch(s, name, &mut index) },
@@ -350,8 +412,11 @@ struct Sequence {
 
 /// Sequences of calls: any status but an internal error, no write out of bounds, no race.
 pub fn calls(data: &[u8]) {
-    let Ok(Sequence { scene, mut calls, mut beside }) =
-        Sequence::arbitrary_take_rest(Unstructured::new(data))
+    let Ok(Sequence {
+        scene,
+        mut calls,
+        mut beside,
+    }) = Sequence::arbitrary_take_rest(Unstructured::new(data))
     else {
         return;
     };
@@ -362,15 +427,28 @@ pub fn calls(data: &[u8]) {
         snapshot: Mutex::new(Vec::new()),
         patience: AtomicI32::new(0),
     };
-    let first = Call::Create { scene: scene % 2, threads: Size::Small(0), keep_error: false };
+    let first = Call::Create {
+        scene: scene % 2,
+        threads: Size::Small(0),
+        keep_error: false,
+    };
     host.make(0, &first);
     std::thread::scope(|scope| {
         if !beside.is_empty() {
-            scope.spawn(|| beside.iter().for_each(|(number, call)| host.make(*number, call)));
+            scope.spawn(|| {
+                beside
+                    .iter()
+                    .for_each(|(number, call)| host.make(*number, call))
+            });
         }
-        calls.iter().for_each(|(number, call)| host.make(*number, call));
+        calls
+            .iter()
+            .for_each(|(number, call)| host.make(*number, call));
     });
-    let handles = host.handles.into_inner().expect("no panic while it was held");
+    let handles = host
+        .handles
+        .into_inner()
+        .expect("no panic while it was held");
     for handle in handles {
         // SAFETY: destroyed ones are no harm.
         unsafe { urlsph_destroy(handle as *mut urlsph_simulation) };

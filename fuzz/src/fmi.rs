@@ -61,15 +61,43 @@ unsafe extern "C" {
         early_return: *mut bool,
         last_time: *mut f64,
     ) -> Status;
-    fn fmi3GetFloat64(instance: Pointer, references: *const u32, count: usize, values: *mut f64, room: usize) -> Status;
-    fn fmi3SetFloat64(instance: Pointer, references: *const u32, count: usize, values: *const f64, room: usize) -> Status;
-    fn fmi3GetUInt64(instance: Pointer, references: *const u32, count: usize, values: *mut u64, room: usize) -> Status;
+    fn fmi3GetFloat64(
+        instance: Pointer,
+        references: *const u32,
+        count: usize,
+        values: *mut f64,
+        room: usize,
+    ) -> Status;
+    fn fmi3SetFloat64(
+        instance: Pointer,
+        references: *const u32,
+        count: usize,
+        values: *const f64,
+        room: usize,
+    ) -> Status;
+    fn fmi3GetUInt64(
+        instance: Pointer,
+        references: *const u32,
+        count: usize,
+        values: *mut u64,
+        room: usize,
+    ) -> Status;
     fn fmi3GetFMUState(instance: Pointer, state: *mut Pointer) -> Status;
     fn fmi3SetFMUState(instance: Pointer, state: Pointer) -> Status;
     fn fmi3FreeFMUState(instance: Pointer, state: *mut Pointer) -> Status;
     fn fmi3SerializedFMUStateSize(instance: Pointer, state: Pointer, size: *mut usize) -> Status;
-    fn fmi3SerializeFMUState(instance: Pointer, state: Pointer, bytes: *mut u8, size: usize) -> Status;
-    fn fmi3DeserializeFMUState(instance: Pointer, bytes: *const u8, size: usize, state: *mut Pointer) -> Status;
+    fn fmi3SerializeFMUState(
+        instance: Pointer,
+        state: Pointer,
+        bytes: *mut u8,
+        size: usize,
+    ) -> Status;
+    fn fmi3DeserializeFMUState(
+        instance: Pointer,
+        bytes: *const u8,
+        size: usize,
+        state: *mut Pointer,
+    ) -> Status;
 }
 
 unsafe extern "C" fn log(_: Pointer, _: i32, category: *const c_char, message: *const c_char) {
@@ -83,7 +111,9 @@ static MODEL: LazyLock<(tempfile::TempDir, CString, CString)> = LazyLock::new(||
     let scene = Scene::from_json(SCENE, &[]).unwrap_or_else(|e| panic!("{e}"));
     let simulation = Simulation::with_threads(scene, 1).unwrap_or_else(|e| panic!("{e}"));
     let text = model_description(&simulation, FmiVersion::V3).unwrap_or_else(|e| panic!("{e}"));
-    let (_, rest) = text.split_once("instantiationToken=\"").expect("it has a token");
+    let (_, rest) = text
+        .split_once("instantiationToken=\"")
+        .expect("it has a token");
     let (token, _) = rest.split_once('"').expect("it ends");
     let path = folder.path().to_str().expect("UTF-8").to_owned();
     (
@@ -118,19 +148,36 @@ impl Number {
 
 #[derive(Debug, Clone, Arbitrary)]
 enum Call {
-    Enter { start: Number, stop: Option<Number> },
+    Enter {
+        start: Number,
+        stop: Option<Number>,
+    },
     Exit,
     Terminate,
     Reset,
     StepMode,
-    DoStep { point: Number, step: Number },
-    Get { references: Vec<u8>, room: u8 },
-    Set { references: Vec<u8>, values: Vec<Number> },
-    Count { reference: u32 },
+    DoStep {
+        point: Number,
+        step: Number,
+    },
+    Get {
+        references: Vec<u8>,
+        room: u8,
+    },
+    Set {
+        references: Vec<u8>,
+        values: Vec<Number>,
+    },
+    Count {
+        reference: u32,
+    },
     GetState,
     SetState,
     FreeState,
-    Through { damage: Option<(u16, u8)>, cut: u8 },
+    Through {
+        damage: Option<(u16, u8)>,
+        cut: u8,
+    },
 }
 
 #[derive(Debug, Arbitrary)]
@@ -165,7 +212,10 @@ pub fn fmi(data: &[u8]) {
         );
         assert!(!instance.is_null());
         if begun {
-            assert_eq!(fmi3EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0), 0);
+            assert_eq!(
+                fmi3EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0),
+                0
+            );
             assert_eq!(fmi3ExitInitializationMode(instance), 0);
         }
         let (mut state, mut now) = (null_mut(), 0.0);
@@ -199,7 +249,16 @@ unsafe fn make(instance: Pointer, call: &Call, state: &mut Pointer, now: &mut f6
                 };
                 let mut flags = [false; 3];
                 let [event, terminate, early] = &mut flags;
-                fmi3DoStep(instance, point.value(*now), step, false, event, terminate, early, now)
+                fmi3DoStep(
+                    instance,
+                    point.value(*now),
+                    step,
+                    false,
+                    event,
+                    terminate,
+                    early,
+                    now,
+                )
             }
             Call::Get { references, room } => {
                 let references: Vec<u32> = references.iter().map(|r| u32::from(*r)).collect();
@@ -211,7 +270,11 @@ unsafe fn make(instance: Pointer, call: &Call, state: &mut Pointer, now: &mut f6
                     values.as_mut_ptr(),
                     usize::from(*room),
                 );
-                assert!(values[usize::from(*room)..].iter().all(|v| *v == f64::INFINITY));
+                assert!(
+                    values[usize::from(*room)..]
+                        .iter()
+                        .all(|v| *v == f64::INFINITY)
+                );
                 status
             }
             Call::Set { references, values } => {
@@ -239,7 +302,10 @@ unsafe fn make(instance: Pointer, call: &Call, state: &mut Pointer, now: &mut f6
                     return status;
                 }
                 let mut bytes = vec![0_u8; size];
-                assert_eq!(fmi3SerializeFMUState(instance, *state, bytes.as_mut_ptr(), size), 0);
+                assert_eq!(
+                    fmi3SerializeFMUState(instance, *state, bytes.as_mut_ptr(), size),
+                    0
+                );
                 if let (Some((at, bits)), false) = (damage, bytes.is_empty()) {
                     let at = usize::from(*at) % size;
                     bytes[at] ^= bits;

@@ -85,7 +85,7 @@ fn rich() -> (Simulation, Vec<u8>) {
         "material": {"von_mises": {"density": 1000, "youngs_modulus": 1e7, "poisson_ratio": 0.3, "yield_stress": 1e4}},
         "heat": {"specific_heat": 100, "reference_temperature": 300, "conductivity": 10},
         "boundary": {"y_max": {"traction": {"external": [0, 0, 0]}}},
-        "contact": {"floor": {"normal": [0, 1, 0], "offset": -0.1}},
+        "contact": {"floor": {"point": [0, -0.1, 0], "normal": [0, 1, 0]}},
         "initial": {"velocity": ["Y", 0, 0]},
         "numerics": {
             "state": "fhj", "volume_dissipation": 0.1, "operators": "repaired",
@@ -127,7 +127,11 @@ pub fn snapshot(data: &[u8]) {
         match restored {
             Err(error) => {
                 told(&error);
-                assert_eq!(simulation.state_hash(), before, "a refused snapshot changes nothing");
+                assert_eq!(
+                    simulation.state_hash(),
+                    before,
+                    "a refused snapshot changes nothing"
+                );
             }
             Ok(()) => {
                 let step = simulation.stable_step();

@@ -1,4 +1,4 @@
-//! What is fuzzed. The tests of the library run the same functions on the corpus.
+//! What is fuzzed: `README.md`.
 
 mod calls;
 mod fmi;

@@ -42,7 +42,8 @@ impl History {
     ) -> Result<Self> {
         let path = path.into();
         let (header, count) = header(columns);
-        let text = std::fs::read_to_string(&path).map_err(|cause| io_error("read", &path, &cause))?;
+        let text =
+            std::fs::read_to_string(&path).map_err(|cause| io_error("read", &path, &cause))?;
         if !text.starts_with(&header) {
             return Err(Error::argument(format!(
                 "the history `{}` has other columns than this run: its probes or patches were others; start \

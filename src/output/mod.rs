@@ -9,8 +9,8 @@ pub mod variables;
 mod vtu;
 
 pub use history::History;
-pub use recorder::Recorder;
 pub use recorder::RESTART;
+pub use recorder::Recorder;
 pub(crate) use recorder::{ACCURACY, ROUNDING, history_interval};
 pub use vtu::{Collection, write_vtu};
 

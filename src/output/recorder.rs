@@ -354,7 +354,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let fields = folder.path().join("fields");
         fs::create_dir(&fields).unwrap();
-        for name in ["state_000001.vtu", "state_000007.vtu", "state_mine.vtu", "other.vtu"] {
+        for name in [
+            "state_000001.vtu",
+            "state_000007.vtu",
+            "state_mine.vtu",
+            "other.vtu",
+        ] {
             fs::write(fields.join(name), "").unwrap();
         }
         fs::write(folder.path().join("notes.txt"), "").unwrap();

@@ -176,7 +176,8 @@ impl Collection {
     /// [`Code::Io`](crate::Code::Io) naming the file.
     pub fn resume(path: impl Into<PathBuf>, time: f64) -> Result<Self> {
         let path = path.into();
-        let text = std::fs::read_to_string(&path).map_err(|cause| io_error("read", &path, &cause))?;
+        let text =
+            std::fs::read_to_string(&path).map_err(|cause| io_error("read", &path, &cause))?;
         let is_kept = |line: &&str| {
             let rest = line.trim_start().strip_prefix(ENTRY);
             let number = rest.and_then(|rest| rest.split_once('"'));

@@ -429,7 +429,11 @@ fn read_file(path: &Path) -> Result<Vec<u8>> {
     let about = std::fs::metadata(path).map_err(|e| failed(&e))?;
     // Others have no end, or wait for somebody to write.
     if !about.is_file() {
-        let what = if about.is_dir() { "a folder" } else { "a device or a pipe" };
+        let what = if about.is_dir() {
+            "a folder"
+        } else {
+            "a device or a pipe"
+        };
         return Err(failed(&format_args!("it is {what}")));
     }
     let file = std::fs::File::open(path).map_err(|e| failed(&e))?;

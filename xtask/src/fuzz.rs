@@ -1,16 +1,11 @@
 //! Coverage-guided fuzzing: `fuzz/README.md`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use xshell::{Shell, cmd};
 
-use crate::tally::Tally;
-
 const TARGETS: [&str; 5] = ["scene", "mesh", "snapshot", "calls", "fmi"];
-
-/// Seconds of a target in the tests: enough to see that it runs, and to meet what a change has made easy to find.
-const IN_TESTS: u32 = 15;
 
 /// What cargo-fuzz sets, too, without a sanitizer; these options are stable.
 const INSTRUMENTS: &str = "-Cpasses=sancov-module \
@@ -64,15 +59,6 @@ pub fn fuzz(sh: &Shell, arguments: &[&str]) -> Result<()> {
     Ok(())
 }
 
-pub fn fuzz_tests(sh: &Shell) -> Result<Tally> {
-    let programs = build(sh)?;
-    let mut tally = Tally::default();
-    for target in TARGETS {
-        tally += Tally::of(run(sh, &programs, target, IN_TESTS));
-    }
-    Ok(tally)
-}
-
 /// Builds the targets with instruments, beside everything else; the folder of the programs.
 fn build(sh: &Shell) -> Result<PathBuf> {
     let verbose = cmd!(sh, "rustc -vV").quiet().read()?;
@@ -89,7 +75,7 @@ fn build(sh: &Shell) -> Result<PathBuf> {
 }
 
 /// Runs a target from the committed inputs and those found before; an input that fails is kept and named.
-fn run(sh: &Shell, programs: &PathBuf, target: &str, seconds: u32) -> Result<()> {
+fn run(sh: &Shell, programs: &Path, target: &str, seconds: u32) -> Result<()> {
     println!("\n-- fuzz {target}, {seconds} s");
     let found = format!("target/fuzz/found/{target}");
     let failed = format!("target/fuzz/failed/{target}-");
@@ -99,14 +85,10 @@ fn run(sh: &Shell, programs: &PathBuf, target: &str, seconds: u32) -> Result<()>
     sh.create_dir(&committed)?;
     let seeds = seeds(sh, target)?;
     let program = programs.join(target);
-    let dictionary = format!("fuzz/{target}.dict");
-    let dictionary = sh
-        .path_exists(&dictionary)
-        .then(|| format!("-dict={dictionary}"));
     cmd!(
         sh,
         "{program} -max_total_time={seconds} -timeout=60 -rss_limit_mb=4096 -max_len=16384 -print_final_stats=1
-            -verbosity=0 -artifact_prefix={failed} {dictionary...} {found} {committed} {seeds}"
+            -verbosity=0 -artifact_prefix={failed} {found} {committed} {seeds}"
     )
     .run()
     .with_context(|| {
@@ -142,7 +124,7 @@ fn seeds(sh: &Shell, target: &str) -> Result<PathBuf> {
 }
 
 /// Adds to the committed inputs what was found and reaches more.
-fn minimise(sh: &Shell, programs: &PathBuf, target: &str) -> Result<()> {
+fn minimise(sh: &Shell, programs: &Path, target: &str) -> Result<()> {
     let program = programs.join(target);
     cmd!(
         sh,

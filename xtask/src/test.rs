@@ -9,7 +9,6 @@ use crate::bench::bench_tests;
 use crate::counts::counts_tests;
 use crate::ffi_tests::ffi_tests;
 use crate::fmu_tests::fmu_tests;
-use crate::fuzz::fuzz_tests;
 use crate::output_tests::output_tests;
 use crate::peer::peer_tests;
 use crate::tally::Tally;
@@ -29,7 +28,6 @@ const PARTS: &[Part] = &[
     ("counts", counts_tests),
     ("C, C++, Python", ffi_tests),
     ("fmu", fmu_tests),
-    ("fuzz", fuzz_tests),
     ("peer", peer_tests),
 ];
 
