@@ -85,6 +85,7 @@ fn run(sh: &Shell, programs: &Path, target: &str, seconds: u32) -> Result<()> {
     sh.create_dir(&committed)?;
     let seeds = seeds(sh, target)?;
     let program = programs.join(target);
+    let seconds = seconds.to_string();
     cmd!(
         sh,
         "{program} -max_total_time={seconds} -timeout=60 -rss_limit_mb=4096 -max_len=16384 -print_final_stats=1
