@@ -53,6 +53,7 @@ fn options(c: &mut Criterion) {
         ("default", &[]),
         ("without dissipation", &["numerics.dissipation=false"]),
         ("first order", &["numerics.reconstruction=none"]),
+        ("single precision", &["numerics.precision=single"]),
         ("minmod", &["numerics.limiter=minmod"]),
         ("shock", &["numerics.limiter=shock"]),
         ("venkatakrishnan", &["numerics.limiter=venkatakrishnan"]),
