@@ -608,6 +608,10 @@ fn a_restart_needs_the_snapshot_of_its_own_run() {
         "another scene",
     );
     refused(&["--set=probes.other=[0, 0, 0]"], "other columns");
+    assert!(
+        content(&bench.path("out")) == before,
+        "a refusal changes nothing"
+    );
     // Damaged in one bit, cut off, of another format, empty, not a file.
     let path = bench.path("out").join("restart.snapshot");
     let good = fs::read(&path).unwrap();

@@ -104,13 +104,6 @@ impl Recorder {
         let field_folder = folder.join("fields");
         fs::create_dir_all(&folder).map_err(|cause| io_error("create", &folder, &cause))?;
 
-        let resolved = serde_json::to_string_pretty(scene).map_err(|cause| {
-            Error::argument(format!("the scene does not turn into JSON: {cause}"))
-        })?;
-        replace_file(&folder.join("scene.json"), |out| {
-            writeln!(out, "{resolved}")
-        })?;
-
         let time = simulation.time();
         let variables = variables::outputs(simulation);
         let columns = variables.iter().flat_map(OutputVariable::element_names);
@@ -124,12 +117,20 @@ impl Recorder {
             schedule
         };
         let history = match before {
-            Before::Another => History::create(path, columns)?,
+            Before::Another => {
+                // Before anything is written: no snapshot may stand beside the files of another run.
+                remove_earlier(&folder)?;
+                History::create(path, columns)?
+            }
+            // Refuses the files of another run before anything is changed.
             Before::Beginning => History::resume(path, columns, time)?,
         };
-        if before == Before::Another {
-            remove_earlier(&folder)?;
-        }
+        let resolved = serde_json::to_string_pretty(scene).map_err(|cause| {
+            Error::argument(format!("the scene does not turn into JSON: {cause}"))
+        })?;
+        replace_file(&folder.join("scene.json"), |out| {
+            writeln!(out, "{resolved}")
+        })?;
         let field_files = match scene.output.field_interval {
             Some(interval) => {
                 fs::create_dir_all(&field_folder)
