@@ -92,15 +92,14 @@ pub fn shock_jump<T: Lane>(
     let rate2 = dx2.of(0.5).mul_add(shear, axial);
     let dilatation2 = (trace * trace).min(rate2);
     let smooth = dx2.of(UNRESOLVED * UNRESOLVED) * m2;
-    // Shares of one, and speeds instead of rates: their powers stay in the range of single precision.
-    let tiny = dx2.of(T::TINY);
-    let unit = dx2.of(1.0) / (w2 + smooth + tiny);
+    // Of shares of one no power leaves the range of single precision.
+    let (one, tiny) = (dx2.of(1.0), dx2.of(T::TINY));
+    let unit = one / (w2 + smooth + tiny);
     let (p, s) = (w2 * unit, smooth * unit);
     let p3 = p * p * p;
-    let (dilatation2, rate2) = (dilatation2 * dx2, rate2 * dx2);
-    let jumps = (dilatation2 * dilatation2) * p3;
-    let all = (rate2 * rate2) * (s * s).mul_add(s, p3);
-    let along = factor * m * jumps / all.mul_add(dx2, tiny);
+    let phi = dilatation2 / (rate2 + tiny);
+    let all = (s * s).mul_add(s, p3);
+    let along = factor * m * (phi * phi * p3) / all.mul_add(dx2, tiny);
     let none = dx2.of(0.0);
     axpy3(w, (m * (m + w_n)).if_positive(along, none), dx)
 }
@@ -214,6 +213,49 @@ mod tests {
             let back = shock_jump(scale3(-1.0, dv), scale3(-1.0, dx), dot(dx, dx), &g, 1.0);
             assert_eq!(back, scale3(-1.0, jump));
         }
+    }
+
+    /// Its powers stay in the range of single precision.
+    #[test]
+    fn shock_is_the_same_in_single_precision() {
+        let mut worst = 0.0_f64;
+        for (length, speed) in [
+            (1e-7, 1e-5),
+            (1e-6, 1e3),
+            (1e-3, 1e-6),
+            (1.0, 1e-8),
+            (1e3, 1e-9),
+            (1e7, 1e4),
+        ] {
+            let mut own = 0.0_f64;
+            for i in 0..300 {
+                let (dv, dx, e) = (
+                    scale3(speed, vector(i, 0)),
+                    scale3(length, vector(i, 3)),
+                    vector(i, 15),
+                );
+                let plane: Mat3<f64> = std::array::from_fn(|r| scale3(e[r], e));
+                let g = scale9(speed / length, &add9(&plane, &scale9(0.1, &matrix(i, 6))));
+                let single3 = |v: Vec3<f64>| [v[0] as f32, v[1] as f32, v[2] as f32];
+                let (dv, dx) = (single3(dv), single3(dx));
+                let g: Mat3<f32> = std::array::from_fn(|r| single3(g[r]));
+                let double3 = |v: Vec3<f32>| v.map(f64::from);
+                let (dvd, dxd) = (double3(dv), double3(dx));
+                let exact = shock_jump(
+                    dvd,
+                    dxd,
+                    dot(dxd, dxd),
+                    &std::array::from_fn(|r| double3(g[r])),
+                    1.0,
+                );
+                let jump = double3(shock_jump(dv, dx, dot(dx, dx), &g, 1.0));
+                let error = sub3(jump, exact);
+                own = own.max(dot(error, error).sqrt() / speed);
+            }
+            println!("{length:e} m, {speed:e} m/s: difference over the speed {own:.1e} (1e-5)");
+            worst = worst.max(own);
+        }
+        assert!(worst < 1e-5);
     }
 
     #[test]
