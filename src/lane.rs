@@ -609,12 +609,7 @@ impl PerSlot {
     /// Adds the value for the slots from `at`.
     #[inline(always)]
     pub fn add<T: Lane>(&mut self, at: usize, value: T) {
-        self.update(
-            at,
-            value,
-            |sum, value| sum + value,
-            |sum, value| sum + value,
-        );
+        self.update(at, value, |sum, value| sum + value);
     }
     /// Takes the minimum with the value for the slots from `at`; a value that is NaN is ignored.
     #[inline(always)]
@@ -622,25 +617,14 @@ impl PerSlot {
         self.update(
             at,
             value,
-            |least, value| value.min(least),
-            |least, value| value.min(least),
+            |least, value| if value < least { value } else { least },
         );
     }
-    /// On lanes where they are of double precision, as the sums are.
     #[inline(always)]
-    fn update<T: Lane>(
-        &mut self,
-        at: usize,
-        value: T,
-        lanes: impl Fn(T, T) -> T,
-        one: impl Fn(f64, f64) -> f64,
-    ) {
+    fn update<T: Lane>(&mut self, at: usize, value: T, each: impl Fn(f64, f64) -> f64) {
         let at = at % T::Real::SLICE;
-        if T::Real::SLICE == SLICE {
-            lanes(T::load(value.token(), &self.0, at), value).store(&mut self.0, at);
-        } else {
-            value.for_lanes(|lane, value| self.0[at + lane] = one(self.0[at + lane], value));
-        }
+        let slots = &mut self.0[at..at + T::WIDTH];
+        value.for_lanes(|lane, value| slots[lane] = each(slots[lane], value));
     }
     /// Sum over the slice.
     pub fn sum(&self) -> f64 {
