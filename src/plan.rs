@@ -3,8 +3,8 @@
 use crate::particles::MeshSummary;
 use crate::reference::Repair;
 use crate::scene::{
-    Limiter, Material, Neighbours, Operators, Precision, Reconstruction, ReferenceUpdate, Scene,
-    StateMeasures, Weights,
+    Geometry, Limiter, Material, Neighbours, Operators, Precision, Reconstruction, ReferenceUpdate,
+    Scene, StateMeasures, Weights,
 };
 
 /// What a scene will cost.
@@ -49,36 +49,55 @@ pub(crate) fn bytes_per_particle(scene: &Scene, neighbours: f64) -> f64 {
         + when(n.state == StateMeasures::Fhj, 9.0)
         + when(scene.heat.is_some(), 1.0)
         + when(plastic, 7.0);
-    // The initial positions, volumes, L, and the order; multipliers and areas of the repair; the spacings.
-    let reference = 14.0
-        + when(updated, 13.0)
-        + when(updated && n.state == StateMeasures::Fhj, 9.0)
-        + when(operators == Operators::Repaired, 15.0)
-        + when(plastic && operators == Operators::Kernel, 6.0)
-        + when(updated && operators == Operators::Repaired, 3.0);
-    // Q, the wave speed's, forces, also across the ends of pieces, grad v; S and the half gradient.
-    let rates = 26.0
-        + when(n.dissipation, 9.0)
-        + when(
-            n.dissipation && n.reconstruction != Reconstruction::None,
-            9.0,
-        )
-        + when(n.volume_dissipation > 0.0, 5.0)
-        + when(n.angular_momentum_projection, 3.0)
-        + when(scene.heat.is_some(), 3.0)
-        + when(
-            scene.heat.as_ref().is_some_and(|h| h.conductivity > 0.0),
-            6.0,
-        );
-    // Weights and half an index; vectors of pairs whose weights are not symmetric, or are an updated
-    // reference's; with the repair these are weights alone.
+    let single = n.precision == Precision::Single;
+    let conducts = scene.heat.as_ref().is_some_and(|h| h.conductivity > 0.0);
+    // Vectors of pairs whose weights are not symmetric, or are an updated reference's; with the repair these are
+    // weights alone.
     let stored = match operators {
         Operators::Kernel => n.redoes_the_repair() || (n.weights == Weights::Tributary && !lattice),
         Operators::Repaired => false,
         Operators::Mesh => true,
     };
     let weights = n.redoes_the_repair() && operators == Operators::Repaired;
-    let pair = 1.125 + when(stored, 6.0) + when(weights, 1.0);
+    // Whether nothing but sums over pairs in single precision reads L and the weights.
+    let forgotten = single
+        && !(updated || stored || conducts)
+        && operators == Operators::Kernel
+        && n.volume_dissipation == 0.0
+        && n.limiter != Limiter::Venkatakrishnan;
+    // The initial positions, volumes, L, and the order; multipliers and areas of the repair; the spacings; copies in
+    // single precision of positions, L and multipliers.
+    let reference = 14.0 - when(forgotten, 9.0)
+        + when(single, 6.0)
+        + when(single && operators == Operators::Repaired, 6.0)
+        + when(updated, 13.0)
+        + when(updated && n.state == StateMeasures::Fhj, 9.0)
+        + when(operators == Operators::Repaired, 15.0)
+        + when(plastic && operators == Operators::Kernel, 6.0)
+        + when(updated && operators == Operators::Repaired, 3.0);
+    // Q, the wave speed's, forces across the ends of pieces, grad v; S and the half gradient; copies of x, v and forces.
+    let swept = 23.0
+        + when(n.dissipation, 9.0)
+        + when(
+            n.dissipation && n.reconstruction != Reconstruction::None,
+            9.0,
+        )
+        + when(single, 9.0);
+    let swept = if single { 0.5 * swept } else { swept };
+    let rates = 3.0
+        + swept
+        + when(n.volume_dissipation > 0.0, 5.0)
+        + when(n.angular_momentum_projection, 3.0)
+        + when(scene.heat.is_some(), 3.0)
+        + when(conducts, 6.0);
+    // Weights and a part of an index. Slices of single precision are longer, so that they are filled less where the
+    // number of neighbours varies.
+    let filled = match &scene.geometry {
+        Geometry::Mesh(mesh) if mesh.content().is_ok_and(|mesh| !mesh.all_hexahedra()) => 1.0 / 1.7,
+        _ => 1.0,
+    };
+    let pair = when(!forgotten, 1.125 + when(stored, 6.0) + when(weights, 1.0))
+        + when(single, (0.53 + when(stored, 3.0)) / filled);
     8.0 * (2.0 * state + reference + rates + neighbours * pair)
 }
 
@@ -270,6 +289,22 @@ mod tests {
                 RUBBER,
                 "",
                 r#""operators": "kernel", "weights": "tributary""#,
+            ),
+            (LATTICE, RUBBER, "", r#""precision": "single""#),
+            (
+                LATTICE,
+                RUBBER,
+                "",
+                r#""precision": "single", "reference_update": "every_step", "kernel_option": 4"#,
+            ),
+            (LATTICE, STEEL, HEAT, r#""precision": "single""#),
+            (CYLINDER, RUBBER, "", r#""precision": "single""#),
+            (&tetrahedra, RUBBER, "", r#""precision": "single""#),
+            (
+                &tetrahedra,
+                RUBBER,
+                "",
+                r#""precision": "single", "operators": "mesh""#,
             ),
             (&tetrahedra, RUBBER, "", ""),
             (&tetrahedra, RUBBER, "", r#""operators": "mesh""#),

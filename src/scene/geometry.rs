@@ -934,8 +934,8 @@ fn sizes(geometry: &Geometry, neighbours: Neighbours) -> Result<Vec<(f64, f64, S
 }
 
 impl Scene {
-    /// Memory that a simulation of this scene will hold [bytes], foreseen without setting it up; exact to a tenth for
-    /// lattices.
+    /// Memory that a simulation of this scene will hold [bytes], foreseen without setting it up: 0.9 to 1.3 times
+    /// what it then is.
     ///
     /// # Errors
     /// [`Code::InvalidScene`] for a geometry without a size.
