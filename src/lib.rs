@@ -16,6 +16,7 @@
 //! | von Mises and Johnson-Cook yield stresses | tables 3, 4; [URL23] 41, 42 | `material::von_mises`, `material::johnson_cook` |
 //! | rates of v, f, h, j | 53-57 | `formulation::url` |
 //! | Riemann dissipation and reconstruction | 59, 60 | `formulation::riemann`, `formulation::limiter` |
+//! | precision of sums over pairs | | `formulation::precision`, `reference::single` |
 //! | Runge-Kutta, time step | 61-63 | `integrator`, `simulation` |
 //! | angular-momentum projection | 64-67 | `formulation::angular_momentum` |
 //! | supports, loads, heat, contact, resultants | | `boundary` |
