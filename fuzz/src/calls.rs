@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use arbitrary::{Arbitrary, Unstructured};
 use urlsph::ffi::*;
 
+use crate::number::Number;
+
 const SCENES: [&str; 4] = [
     r#"{"geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.5}},
         "material": {"neo_hookean": {"density": 1000, "youngs_modulus": 1e7, "poisson_ratio": 0.3}},
@@ -24,32 +26,6 @@ const SCENES: [&str; 4] = [
     r#"{"geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": -0.5}}}"#,
     "{",
 ];
-
-/// A number as a host may pass it.
-#[derive(Debug, Clone, Copy, Arbitrary)]
-enum Number {
-    Small(i8),
-    Share(u8),
-    Any(f64),
-    NotANumber,
-    Infinite,
-    Largest,
-    Smallest,
-}
-
-impl Number {
-    fn value(self) -> f64 {
-        match self {
-            Self::Small(n) => f64::from(n),
-            Self::Share(n) => f64::from(n) * 1e-6,
-            Self::Any(x) => x,
-            Self::NotANumber => f64::NAN,
-            Self::Infinite => f64::INFINITY,
-            Self::Largest => f64::MAX,
-            Self::Smallest => f64::MIN_POSITIVE,
-        }
-    }
-}
 
 /// An index, a count or a size.
 #[derive(Debug, Clone, Copy, Arbitrary)]
@@ -258,7 +234,7 @@ impl Host {
                 count,
                 missing,
             } => {
-                let few: Vec<f64> = (0..ROOM).map(|i| values[i % 4].value()).collect();
+                let few: Vec<f64> = (0..ROOM).map(|i| values[i % 4].value(0.0)).collect();
                 let (data, count) = match missing {
                     true => (null(), count.value()),
                     false => (few.as_ptr(), count.at_most(ROOM)),
@@ -285,11 +261,11 @@ impl Host {
             }
             Call::Step(dt) => {
                 self.patience.store(5, Ordering::Relaxed);
-                unsafe { urlsph_step(s, dt.value()) }
+                unsafe { urlsph_step(s, dt.value(0.0)) }
             }
             Call::AdvanceTo(time) => {
                 self.patience.store(5, Ordering::Relaxed);
-                unsafe { urlsph_advance_to(s, time.value()) }
+                unsafe { urlsph_advance_to(s, time.value(0.0)) }
             }
             Call::Callbacks { observing } => {
                 let callbacks = self.callbacks(*observing);

@@ -8,6 +8,8 @@ use arbitrary::{Arbitrary, Unstructured};
 use urlsph::fmu::{FmiVersion, model_description};
 use urlsph::{Scene, Simulation};
 
+use crate::number::Number;
+
 const SCENE: &str = r#"{
     "geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.5}},
     "material": {"neo_hookean": {"density": 1000, "youngs_modulus": 1e7, "poisson_ratio": 0.3}},
@@ -122,29 +124,6 @@ static MODEL: LazyLock<(tempfile::TempDir, CString, CString)> = LazyLock::new(||
         CString::new(path).expect("no NUL"),
     )
 });
-
-#[derive(Debug, Clone, Copy, Arbitrary)]
-enum Number {
-    Small(i8),
-    Share(u8),
-    Any(f64),
-    NotANumber,
-    Infinite,
-    Now,
-}
-
-impl Number {
-    fn value(self, now: f64) -> f64 {
-        match self {
-            Self::Small(n) => f64::from(n),
-            Self::Share(n) => f64::from(n) * 1e-5,
-            Self::Any(x) => x,
-            Self::NotANumber => f64::NAN,
-            Self::Infinite => f64::INFINITY,
-            Self::Now => now,
-        }
-    }
-}
 
 #[derive(Debug, Clone, Arbitrary)]
 enum Call {

@@ -3,6 +3,7 @@
 mod calls;
 mod fmi;
 mod inputs;
+mod number;
 
 pub use calls::calls;
 pub use fmi::fmi;

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::project;
+
 const TARGETS: [&str; 5] = ["scene", "mesh", "snapshot", "calls", "fmi"];
 
 /// What cargo-fuzz sets, too, without a sanitizer; these options are stable.
@@ -59,29 +61,36 @@ pub fn fuzz(sh: &Shell, arguments: &[&str]) -> Result<()> {
     Ok(())
 }
 
+/// Where everything of fuzzing is built and found.
+fn folder() -> PathBuf {
+    project::target().join("fuzz")
+}
+
 /// Builds the targets with instruments, beside everything else; the folder of the programs.
 fn build(sh: &Shell) -> Result<PathBuf> {
     let verbose = cmd!(sh, "rustc -vV").quiet().read()?;
     let host = verbose.lines().find_map(|line| line.strip_prefix("host: "));
     let host = host.context("rustc does not tell its host")?;
     // With a target of its own the instruments stay out of build scripts and macros.
+    let target = folder();
     cmd!(
         sh,
-        "cargo build --manifest-path fuzz/Cargo.toml --release --locked --target {host} --target-dir target/fuzz"
+        "cargo build --manifest-path fuzz/Cargo.toml --release --locked --target {host} --target-dir {target}"
     )
     .env("RUSTFLAGS", INSTRUMENTS)
     .run()?;
-    Ok(sh.current_dir().join(format!("target/fuzz/{host}/release")))
+    Ok(target.join(host).join("release"))
 }
 
 /// Runs a target from the committed inputs and those found before; an input that fails is kept and named.
 fn run(sh: &Shell, programs: &Path, target: &str, seconds: u32) -> Result<()> {
     println!("\n-- fuzz {target}, {seconds} s");
-    let found = format!("target/fuzz/found/{target}");
-    let failed = format!("target/fuzz/failed/{target}-");
+    let found = folder().join("found").join(target);
+    let failures = folder().join("failed");
+    let failed = failures.join(format!("{target}-"));
     let committed = format!("fuzz/corpus/{target}");
     sh.create_dir(&found)?;
-    sh.create_dir("target/fuzz/failed")?;
+    sh.create_dir(&failures)?;
     sh.create_dir(&committed)?;
     let seeds = seeds(sh, target)?;
     let program = programs.join(target);
@@ -93,14 +102,14 @@ fn run(sh: &Shell, programs: &Path, target: &str, seconds: u32) -> Result<()> {
     )
     .run()
     .with_context(|| {
-        format!("fuzzing {target} found an input that fails: it is in target/fuzz/failed; put it into {committed} \
-                 once it is mended")
+        format!("fuzzing {target} found an input that fails: it is in {}; put it into {committed} \
+                 once it is mended", failures.display())
     })
 }
 
 /// Inputs that the repository has anyway.
 fn seeds(sh: &Shell, target: &str) -> Result<PathBuf> {
-    let folder = sh.current_dir().join(format!("target/fuzz/seeds/{target}"));
+    let folder = folder().join("seeds").join(target);
     sh.remove_path(&folder)?;
     sh.create_dir(&folder)?;
     match target {
@@ -126,10 +135,10 @@ fn seeds(sh: &Shell, target: &str) -> Result<PathBuf> {
 
 /// Adds to the committed inputs what was found and reaches more.
 fn minimise(sh: &Shell, programs: &Path, target: &str) -> Result<()> {
-    let program = programs.join(target);
+    let (program, found) = (programs.join(target), folder().join("found").join(target));
     cmd!(
         sh,
-        "{program} -merge=1 -max_len=2048 -timeout=10 fuzz/corpus/{target} target/fuzz/found/{target}"
+        "{program} -merge=1 -max_len=2048 -timeout=10 fuzz/corpus/{target} {found}"
     )
     .run()?;
     Ok(())
