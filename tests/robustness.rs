@@ -3,6 +3,9 @@
 
 mod common;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
 use urlsph::{Code, Field, Quantity, Snapshot};
 
 use common::{BLOCK, block, field, refuses};
@@ -224,4 +227,28 @@ fn a_snapshot_outlives_what_a_run_writes() {
             Code::Snapshot
         );
     }
+}
+
+/// A host's own pool of threads runs many bodies side by side, and none of them inside another.
+#[test]
+fn many_bodies_run_in_a_pool_of_the_host() {
+    let depth = AtomicUsize::new(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a pool");
+    let hashes: Vec<u64> = pool.install(|| {
+        let one = |_| {
+            let within = depth.fetch_add(1, Ordering::Relaxed);
+            let mut simulation = block(&[]);
+            simulation
+                .advance(3.0 * simulation.stable_step())
+                .expect("stable");
+            depth.fetch_sub(1, Ordering::Relaxed);
+            assert_eq!(within, 0, "one body runs inside another");
+            simulation.state_hash()
+        };
+        (0..20).into_par_iter().with_max_len(1).map(one).collect()
+    });
+    assert!(hashes.iter().all(|hash| *hash == hashes[0]));
 }

@@ -1,10 +1,10 @@
 //! What the acceptance tests share: scenes of the examples, runs step by step.
 
-use nalgebra::{Matrix4, Vector4};
-use urlsph::{Field, Scene, Simulation};
+use urlsph::{Scene, Simulation};
 
 pub use crate::cases::{Meter, Table, displacement, example, norm};
 pub use crate::common::field;
+pub use crate::common::roughness::Roughness;
 
 /// A model of the columns: name and lattice spacing [m].
 #[derive(Debug, Clone, Copy)]
@@ -91,64 +91,4 @@ pub fn dissipation_ratio(simulation: &Simulation) -> f64 {
 /// Observed order between two resolutions.
 pub fn order(coarse: (f64, f64), fine: (f64, f64)) -> f64 {
     (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
-}
-
-/// What a linear field does not explain: the residual of a particle's pressure against the linear fit to
-/// its nearest neighbours, over the deviation of the pressure from its mean, both in L2. A pressure that
-/// alternates from particle to particle gives 1 and more, a smooth one the square of the spacing over its
-/// wavelength.
-pub struct Roughness {
-    volumes: Vec<f64>,
-    /// Neighbours and their weights in the fit's value at the particle.
-    fits: Vec<Vec<(usize, f64)>>,
-}
-
-impl Roughness {
-    const NEIGHBOURS: usize = 14;
-
-    /// For the particles as they lie at the start.
-    pub fn new(simulation: &Simulation) -> Self {
-        let positions = field(simulation, Field::InitialPosition);
-        let points: Vec<&[f64]> = positions.chunks_exact(3).collect();
-        let fits = points.iter().map(|at| {
-            let distance2 = |b: usize| (0..3).map(|c| (points[b][c] - at[c]).powi(2)).sum::<f64>();
-            let mut near: Vec<(f64, usize)> =
-                (0..points.len()).map(|b| (distance2(b), b)).collect();
-            near.select_nth_unstable_by(Self::NEIGHBOURS, |a, b| a.0.total_cmp(&b.0));
-            near.truncate(Self::NEIGHBOURS + 1);
-            let scale = near.iter().fold(0.0, |s: f64, n| s.max(n.0)).sqrt();
-            let rows: Vec<(usize, Vector4<f64>)> = near
-                .into_iter()
-                .filter(|n| n.0 > 0.0)
-                .map(|(_, b)| {
-                    let d = |c: usize| (points[b][c] - at[c]) / scale;
-                    (b, Vector4::new(1.0, d(0), d(1), d(2)))
-                })
-                .collect();
-            let normal: Matrix4<f64> = rows.iter().map(|(_, r)| r * r.transpose()).sum();
-            // The nearest may lie in one plane, where layers are thick: then the fit is one in that plane.
-            let inverse = normal.pseudo_inverse(1e-9).expect("a tolerance");
-            let value = inverse.column(0).into_owned();
-            rows.iter().map(|(b, r)| (*b, r.dot(&value))).collect()
-        });
-        Self {
-            fits: fits.collect(),
-            volumes: field(simulation, Field::InitialVolume),
-        }
-    }
-
-    /// Of the pressure now.
-    pub fn of(&self, simulation: &Simulation) -> f64 {
-        let pressure = field(simulation, Field::Pressure);
-        let weighed = |f: &dyn Fn(usize) -> f64| -> f64 {
-            (0..pressure.len()).map(|a| self.volumes[a] * f(a)).sum()
-        };
-        let mean = weighed(&|a| pressure[a]) / weighed(&|_| 1.0);
-        let residual = |a: usize| {
-            let fit: f64 = self.fits[a].iter().map(|(b, w)| w * pressure[*b]).sum();
-            pressure[a] - fit
-        };
-        let rough = weighed(&|a| residual(a).powi(2));
-        (rough / weighed(&|a| (pressure[a] - mean).powi(2))).sqrt()
-    }
 }

@@ -3,6 +3,8 @@
 // Every test program is built with this file, and uses a part of it.
 #![allow(dead_code)]
 
+pub mod roughness;
+
 use urlsph::{Field, Result, Scene, Simulation};
 
 /// A free block of 5 x 9 x 5 particles.
