@@ -189,7 +189,11 @@ fn any_number_of_threads_gives_the_same_bits() {
         let _ = writeln!(found, "{:016x} {case} {}", hashes[0].0, overrides.join(" "));
     }
     // Sines and powers are those of the C library, whose last bits differ from one to another.
-    if cfg!(all(target_os = "linux", target_env = "gnu", target_arch = "x86_64")) {
+    if cfg!(all(
+        target_os = "linux",
+        target_env = "gnu",
+        target_arch = "x86_64"
+    )) {
         assert!(
             found == HASHES,
             "results have changed: where that is meant, put this into tests/acceptance/hashes.txt\n{found}"

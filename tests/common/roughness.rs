@@ -26,8 +26,9 @@ impl Roughness {
             let distance2 = |b: usize| (0..3).map(|c| (points[b][c] - at[c]).powi(2)).sum::<f64>();
             let mut near: Vec<(f64, usize)> =
                 (0..points.len()).map(|b| (distance2(b), b)).collect();
-            near.select_nth_unstable_by(Self::NEIGHBOURS, |a, b| a.0.total_cmp(&b.0));
-            near.truncate(Self::NEIGHBOURS + 1);
+            let most = Self::NEIGHBOURS.min(points.len() - 1);
+            near.select_nth_unstable_by(most, |a, b| a.0.total_cmp(&b.0));
+            near.truncate(most + 1);
             let scale = near.iter().fold(0.0, |s: f64, n| s.max(n.0)).sqrt();
             let rows: Vec<(usize, Vector4<f64>)> = near
                 .into_iter()
@@ -51,16 +52,31 @@ impl Roughness {
 
     /// Of the pressure now.
     pub fn of(&self, simulation: &Simulation) -> f64 {
+        let (rough, deviation) = self.parts(simulation);
+        rough / deviation
+    }
+
+    /// The residual and the deviation of the pressure now, both in L2 [Pa].
+    pub fn parts(&self, simulation: &Simulation) -> (f64, f64) {
         let pressure = field(simulation, Field::Pressure);
-        let weighed = |f: &dyn Fn(usize) -> f64| -> f64 {
-            (0..pressure.len()).map(|a| self.volumes[a] * f(a)).sum()
-        };
-        let mean = weighed(&|a| pressure[a]) / weighed(&|_| 1.0);
+        let mean = self.mean(|a| pressure[a]);
         let residual = |a: usize| {
             let fit: f64 = self.fits[a].iter().map(|(b, w)| w * pressure[*b]).sum();
             pressure[a] - fit
         };
-        let rough = weighed(&|a| residual(a).powi(2));
-        (rough / weighed(&|a| (pressure[a] - mean).powi(2))).sqrt()
+        let rough = self.mean(|a| residual(a).powi(2));
+        (
+            rough.sqrt(),
+            self.mean(|a| (pressure[a] - mean).powi(2)).sqrt(),
+        )
+    }
+
+    /// Mean over the body.
+    pub fn mean(&self, value: impl Fn(usize) -> f64) -> f64 {
+        let sum = |f: &dyn Fn(usize) -> f64| -> f64 {
+            let all = self.volumes.iter().enumerate();
+            all.map(|(a, volume)| volume * f(a)).sum()
+        };
+        sum(&value) / sum(&|_| 1.0)
     }
 }

@@ -3,6 +3,7 @@
 mod bench;
 mod counts;
 mod demo;
+mod extremes;
 mod ffi_tests;
 mod fmu_tests;
 mod fuzz;
@@ -31,6 +32,8 @@ Tasks:
               present ones the expected ones (benches/counts/README.md)
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
+  extremes    Where the method breaks: sweeps of loads, materials, particles and units, as tables and a map under
+              target/extremes/ (benches/extremes/README.md)
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
   fmu-tests   The tests of the FMUs from Python alone, and the thermal coupling of two FMUs
   fuzz        [TARGET...] [--seconds N] [--minimise]: coverage-guided fuzzing of scene, mesh, snapshot, calls
@@ -41,7 +44,7 @@ Tasks:
   peer        Time and errors beside LAMMPS' Smooth Mach Dynamics, one core each; the report is
               target/peer/report.md. Options: benches/peer/README.md
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
-  validate    The long comparisons with reference solutions, with residuals and tolerances
+  validate    The long comparisons with reference solutions, with residuals and tolerances, and the extremes
   wheel       The Python package with the library inside, in target/wheel/
 ";
 
@@ -63,6 +66,7 @@ fn run(arguments: &[String]) -> Result<()> {
         ["bench", arguments @ ..] => bench::bench(&sh, arguments),
         ["counts", arguments @ ..] => counts::counts(&sh, arguments),
         ["demo"] => demo::demo(&sh),
+        ["extremes", arguments @ ..] => extremes::extremes(&sh, arguments),
         ["ffi-tests"] => ffi_tests::run(&sh),
         ["fmu-tests"] => fmu_tests::run(&sh),
         ["fuzz", arguments @ ..] => fuzz::fuzz(&sh, arguments),

@@ -3,6 +3,7 @@
 use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::extremes;
 use crate::tally::Tally;
 
 /// Where the tables of the last validation are kept.
@@ -48,5 +49,6 @@ pub fn validate(sh: &Shell) -> Result<()> {
     }
     sh.write_file(RESULTS, results)?;
     println!("Tables: {RESULTS}");
+    extremes::update(sh)?;
     Ok(())
 }
