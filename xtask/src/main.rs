@@ -1,5 +1,6 @@
 //! The project's tasks: `cargo xtask <task>`.
 
+mod abi;
 mod bench;
 mod counts;
 mod demo;
@@ -25,6 +26,8 @@ const HELP: &str = "\
 Usage: cargo xtask <TASK>
 
 Tasks:
+  abi         Programs built against an earlier release run with this library; --freeze keeps header and
+              symbols of the present version (ffi-tests/abi/README.md)
   bench       Speed against accuracy: cases with reference solutions over resolution and numerics, as
               JSON, CSV and a report under target/bench/; --quick takes a minute (bench --help)
   counts      Instructions, memory, pair-updates and errors against those expected; --update makes the
@@ -60,6 +63,8 @@ fn run(arguments: &[String]) -> Result<()> {
     let sh = project::shell()?;
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments.as_slice() {
+        ["abi"] => abi::abi(&sh),
+        ["abi", "--freeze"] => abi::freeze(&sh),
         ["bench", arguments @ ..] => bench::bench(&sh, arguments),
         ["counts", arguments @ ..] => counts::counts(&sh, arguments),
         ["demo"] => demo::demo(&sh),

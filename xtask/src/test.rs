@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::abi::abi_tests;
 use crate::bench::bench_tests;
 use crate::counts::counts_tests;
 use crate::ffi_tests::ffi_tests;
@@ -26,6 +27,7 @@ const PARTS: &[Part] = &[
     ("output files", output_tests),
     ("bench", bench_tests),
     ("counts", counts_tests),
+    ("abi", abi_tests),
     ("C, C++, Python", ffi_tests),
     ("fmu", fmu_tests),
     ("peer", peer_tests),
