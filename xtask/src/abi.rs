@@ -169,6 +169,7 @@ impl Release {
         command
             .current_dir(project::root())
             .arg(folder.join("scene.json"))
+            .arg(build.join("snapshot"))
             .env("LD_LIBRARY_PATH", lib)
             .env("DYLD_LIBRARY_PATH", lib);
         let mut tally = Tally::run(command)?;
@@ -248,7 +249,10 @@ impl Header {
         }
         let functions = functions.split('}').next().unwrap_or_default();
         for declaration in declarations(functions) {
-            let name = declaration.split('(').next().and_then(last_name);
+            // In front of the name there may be a note in brackets, too.
+            let name = declaration
+                .rsplit_once('(')
+                .and_then(|(head, _)| last_name(head));
             let name = name.with_context(|| format!("`{declaration}` is no function"))?;
             this.functions.push(Function {
                 name: name.to_owned(),

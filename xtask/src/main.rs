@@ -4,6 +4,7 @@ mod abi;
 mod bench;
 mod counts;
 mod demo;
+mod deny;
 mod ffi_tests;
 mod fmu_tests;
 mod fuzz;
@@ -12,8 +13,10 @@ mod install;
 mod output_tests;
 mod peer;
 mod project;
+mod semver;
 mod tally;
 mod test;
+mod tools;
 mod validate;
 mod venv;
 mod wheel;
@@ -34,6 +37,8 @@ Tasks:
               present ones the expected ones (benches/counts/README.md)
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
+  deny        Licences, duplicates, sources and known vulnerabilities of what this is built from, and whether
+              README.md names it all; the vulnerabilities come from GitHub
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
   fmu-tests   The tests of the FMUs from Python alone, and the thermal coupling of two FMUs
   fuzz        [TARGET...] [--seconds N] [--minimise]: coverage-guided fuzzing of scene, mesh, snapshot, calls
@@ -43,6 +48,8 @@ Tasks:
               files
   peer        Time and errors beside LAMMPS' Smooth Mach Dynamics, one core each; the report is
               target/peer/report.md. Options: benches/peer/README.md
+  semver      [REVISION]: the Rust interface against that of the last release, or of a revision, by
+              cargo-semver-checks
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
   validate    The long comparisons with reference solutions, with residuals and tolerances
   wheel       The Python package with the library inside, in target/wheel/
@@ -67,6 +74,7 @@ fn run(arguments: &[String]) -> Result<()> {
         ["abi", "--freeze"] => abi::freeze(&sh),
         ["bench", arguments @ ..] => bench::bench(&sh, arguments),
         ["counts", arguments @ ..] => counts::counts(&sh, arguments),
+        ["deny"] => deny::deny(&sh),
         ["demo"] => demo::demo(&sh),
         ["ffi-tests"] => ffi_tests::run(&sh),
         ["fmu-tests"] => fmu_tests::run(&sh),
@@ -75,6 +83,8 @@ fn run(arguments: &[String]) -> Result<()> {
         ["header", "--check"] => header::header(&sh, true),
         ["install", arguments @ ..] => install::install(&sh, arguments),
         ["peer", arguments @ ..] => peer::peer(&sh, arguments),
+        ["semver"] => semver::semver(&sh, None),
+        ["semver", revision] => semver::semver(&sh, Some(revision)),
         ["test"] => test::test(&sh),
         ["wheel"] => wheel::wheel(&sh).map(drop),
         ["validate"] => validate::validate(&sh),

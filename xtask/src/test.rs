@@ -8,6 +8,7 @@ use xshell::{Shell, cmd};
 use crate::abi::abi_tests;
 use crate::bench::bench_tests;
 use crate::counts::counts_tests;
+use crate::deny::deny_tests;
 use crate::ffi_tests::ffi_tests;
 use crate::fmu_tests::fmu_tests;
 use crate::output_tests::output_tests;
@@ -23,6 +24,7 @@ const PARTS: &[Part] = &[
     ("lints", lints),
     ("no features", no_features),
     ("documentation", documentation),
+    ("dependencies", deny_tests),
     ("rust", rust),
     ("output files", output_tests),
     ("bench", bench_tests),

@@ -8,7 +8,7 @@
 
 #include "../../check.h"
 
-static const char *scene_path;
+static const char *scene_path, *file_path;
 
 enum { PARTICLES = 3 * 5 * 3, FACE = 3 * 3, SIDE = 3 * 5 };
 
@@ -303,6 +303,13 @@ static void snapshots(void) {
     const uint64_t saved = hash(s);
     CHECK(saved != 0 && urlsph_step(s, 1e-4) == URLSPH_OK && hash(s) != saved);
     CHECK(urlsph_restore_snapshot(s, bytes, size) == URLSPH_OK && hash(s) == saved);
+    CHECK(urlsph_step(s, 1e-4) == URLSPH_OK);
+    CHECK(urlsph_save_snapshot_to_file(s, file_path) == URLSPH_OK);
+    const uint64_t later = hash(s);
+    CHECK(urlsph_restore_snapshot(s, bytes, size) == URLSPH_OK && hash(s) == saved);
+    CHECK(urlsph_restore_snapshot_from_file(s, file_path) == URLSPH_OK && hash(s) == later);
+    CHECK(remove(file_path) == 0);
+    CHECK(urlsph_restore_snapshot_from_file(s, file_path) == URLSPH_IO);
     bytes[size / 2] ^= 1;
     CHECK(urlsph_restore_snapshot(s, bytes, size) == URLSPH_SNAPSHOT);
     free(bytes);
@@ -310,11 +317,12 @@ static void snapshots(void) {
 }
 
 int main(int argc, char **argv) {
-    if (argc != 2) {
-        fprintf(stderr, "usage: %s SCENE.json\n", argv[0]);
+    if (argc != 3) {
+        fprintf(stderr, "usage: %s SCENE.json FILE\n", argv[0]);
         return 2;
     }
     scene_path = argv[1];
+    file_path = argv[2];
     RUN(library);
     RUN(creation);
     RUN(errors);
