@@ -130,3 +130,26 @@ fn named(readme: &str) -> Result<BTreeSet<String>> {
         .map(str::to_owned)
         .collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read() {
+        let set = |names: &[&str]| names.iter().map(|n| n.to_string()).collect::<BTreeSet<_>>();
+        let readme = "# a\n\n## Dependencies\n\n| crate | for |\n| --- | --- |\n| `one`, `two` | `three` |\n\n\
+                      `four`\n\n| package | for |\n| `five` | it |\n\n## b\n| `six` | it |\n";
+        assert_eq!(named(readme).unwrap(), set(&["one", "two", "five"]));
+        assert_eq!(
+            packages("# why\nNumPy==2.4.6\n\n").unwrap(),
+            set(&["NumPy"])
+        );
+        assert!(packages("numpy>=2").is_err());
+        let metadata = serde_json::json!({"packages": [
+            {"dependencies": [{"name": "one"}, {"name": "ours", "path": "/here"}]},
+            {"dependencies": [{"name": "two"}, {"name": "one"}]},
+        ]});
+        assert_eq!(crates(&metadata).unwrap(), set(&["one", "two"]));
+    }
+}
