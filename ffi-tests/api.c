@@ -1021,7 +1021,7 @@ static void snapshot_files(void) {
     urlsph_simulation *s = create(NULL, 2), *twin = create(NULL, 1);
     urlsph_simulation *other = create("material.neo_hookean.poisson_ratio=0.21", 1);
     CHECK(s && twin && other);
-    char folder[] = "/tmp/urlsph-XXXXXX", path[64], part[64], below[64];
+    char folder[] = "/tmp/urlsph-XXXXXX", path[64], part[80], below[64];
     CHECK(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/s.snapshot", folder);
     snprintf(part, sizeof part, "%s.part", path);

@@ -27,7 +27,8 @@ pub fn deny(sh: &Shell) -> Result<()> {
         "deny.toml and README.md do not allow these dependencies"
     );
     for manifest in WORKSPACES {
-        check(sh, manifest, &["advisories"])?;
+        check(sh, manifest, &["advisories"])
+            .context("a dependency has a known fault, or GitHub, which has the list of them, cannot be reached")?;
     }
     Ok(())
 }
@@ -48,7 +49,9 @@ fn check(sh: &Shell, manifest: &str, what: &[&str]) -> Result<()> {
         "{program} --manifest-path {manifest} check --hide-inclusion-graph {what...}"
     )
     .run()
-    .with_context(|| format!("{manifest}: replace the dependency, or give deny.toml a reason"))
+    .with_context(|| {
+        format!("{manifest}: update or replace the dependency, or give deny.toml a reason")
+    })
 }
 
 /// README.md names every crate and every Python package that is asked for, and no other.
