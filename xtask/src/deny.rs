@@ -46,7 +46,7 @@ fn check(sh: &Shell, manifest: &str, what: &[&str]) -> Result<()> {
     let program = tool(sh, "cargo-deny", VERSION)?;
     cmd!(
         sh,
-        "{program} --manifest-path {manifest} check --hide-inclusion-graph {what...}"
+        "{program} --locked --manifest-path {manifest} check --hide-inclusion-graph {what...}"
     )
     .run()
     .with_context(|| {
@@ -60,7 +60,7 @@ fn documented(sh: &Shell) -> Result<()> {
     for manifest in WORKSPACES {
         let metadata = cmd!(
             sh,
-            "cargo metadata --no-deps --format-version 1 --manifest-path {manifest}"
+            "cargo metadata --locked --no-deps --format-version 1 --manifest-path {manifest}"
         );
         wanted.extend(crates(&serde_json::from_str(&metadata.quiet().read()?)?)?);
     }
