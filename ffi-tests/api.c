@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <urlsph.h>
 
@@ -257,6 +258,8 @@ static bool all_give(urlsph_simulation *s, urlsph_status wanted) {
         GIVES(urlsph_advance_to(s, 1.0));
         GIVES(urlsph_save_snapshot(s, bytes, 1, &n));
         GIVES(urlsph_restore_snapshot(s, bytes, 1));
+        GIVES(urlsph_save_snapshot_to_file(s, "never.snapshot"));
+        GIVES(urlsph_restore_snapshot_from_file(s, "never.snapshot"));
     }
 #undef GIVES
     return same;
@@ -331,6 +334,8 @@ static void null_outputs(void) {
     INVALID(urlsph_save_snapshot(s, NULL, SIZE_MAX, &n));
     INVALID(urlsph_restore_snapshot(s, NULL, 100));
     INVALID(urlsph_restore_snapshot(s, &byte, SIZE_MAX));
+    INVALID(urlsph_save_snapshot_to_file(s, NULL));
+    INVALID(urlsph_restore_snapshot_from_file(s, NULL));
     INVALID(urlsph_get_state_hash(s, NULL));
     CHECK(urlsph_get_last_error(s, NULL, sizeof(urlsph_error)) == URLSPH_INVALID_ARGUMENT);
     CHECK(strstr(last(s).text, "hash"));
@@ -1002,6 +1007,81 @@ static void snapshots(void) {
     CHECK(urlsph_destroy(s) == URLSPH_OK);
 }
 
+/* What is in a folder, beside itself and the one above. */
+static size_t files_in(const char *folder) {
+    DIR *open = opendir(folder);
+    if (!open) return SIZE_MAX;
+    size_t count = 0;
+    while (readdir(open)) ++count;
+    closedir(open);
+    return count - 2;
+}
+
+static void snapshot_files(void) {
+    urlsph_simulation *s = create(NULL, 2), *twin = create(NULL, 1);
+    urlsph_simulation *other = create("material.neo_hookean.poisson_ratio=0.21", 1);
+    CHECK(s && twin && other);
+    char folder[] = "/tmp/urlsph-XXXXXX", path[64], part[80], below[64];
+    CHECK(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/s.snapshot", folder);
+    snprintf(part, sizeof part, "%s.part", path);
+    snprintf(below, sizeof below, "%s/nowhere/s.snapshot", folder);
+
+    /* The file has the bytes of the copy, and another simulation goes on from it. */
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+    CHECK(urlsph_save_snapshot_to_file(s, path) == URLSPH_OK && files_in(folder) == 1);
+    const uint64_t saved = hash(s);
+    size_t size, written;
+    CHECK(urlsph_get_snapshot_size(s, &size) == URLSPH_OK);
+    uint8_t *bytes = malloc(size), *stored = malloc(size + 1);
+    CHECK(bytes && stored && urlsph_save_snapshot(s, bytes, size, &written) == URLSPH_OK);
+    FILE *file = fopen(path, "rb");
+    CHECK(file && fread(stored, 1, size + 1, file) == size);
+    CHECK(fclose(file) == 0 && memcmp(bytes, stored, size) == 0);
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK);
+    const uint64_t once = hash(s);
+    CHECK(urlsph_restore_snapshot_from_file(twin, path) == URLSPH_OK && hash(twin) == saved);
+    CHECK(urlsph_step(twin, 1e-3) == URLSPH_OK && hash(twin) == once);
+
+    /* What cannot be read leaves the state; what cannot be written leaves the folder, too. */
+    FAILS(urlsph_restore_snapshot_from_file(s, below), URLSPH_IO);
+    CHECK(strstr(last(s).text, below));
+    FAILS(urlsph_restore_snapshot_from_file(s, folder), URLSPH_IO);
+    FAILS(urlsph_restore_snapshot_from_file(s, scene_path), URLSPH_SNAPSHOT);
+    INVALID(urlsph_restore_snapshot_from_file(s, "\xff"));
+    CHECK(urlsph_restore_snapshot_from_file(other, path) == URLSPH_SNAPSHOT);
+    FAILS(urlsph_save_snapshot_to_file(s, below), URLSPH_IO);
+    CHECK(strstr(last(s).text, below));
+    FAILS(urlsph_save_snapshot_to_file(s, folder), URLSPH_IO);
+    FAILS(urlsph_save_snapshot_to_file(s, ""), URLSPH_IO);
+    INVALID(urlsph_save_snapshot_to_file(s, "\xff"));
+    CHECK(files_in(folder) == 1 && hash(s) == once);
+
+    /* A full disk: the snapshot that was there stays, and one that was not does not come. */
+    if (access("/dev/full", W_OK) == 0) {
+        CHECK(symlink("/dev/full", part) == 0);
+        FAILS(urlsph_save_snapshot_to_file(s, path), URLSPH_IO);
+        printf("    %s\n", last(s).text);
+        CHECK(files_in(folder) == 1 && hash(s) == once);
+        CHECK(urlsph_restore_snapshot_from_file(twin, path) == URLSPH_OK && hash(twin) == saved);
+        CHECK(unlink(path) == 0 && symlink("/dev/full", part) == 0);
+        FAILS(urlsph_save_snapshot_to_file(s, path), URLSPH_IO);
+        CHECK(files_in(folder) == 0 && hash(s) == once);
+    }
+
+    /* And the simulation goes on as if nothing had been. */
+    CHECK(urlsph_step(s, 1e-3) == URLSPH_OK && urlsph_save_snapshot_to_file(s, path) == URLSPH_OK);
+    CHECK(urlsph_restore_snapshot(twin, bytes, size) == URLSPH_OK);
+    CHECK(urlsph_step(twin, 1e-3) == URLSPH_OK && urlsph_step(twin, 1e-3) == URLSPH_OK);
+    CHECK(hash(twin) == hash(s));
+    CHECK(unlink(path) == 0 && rmdir(folder) == 0);
+    free(bytes);
+    free(stored);
+    CHECK(urlsph_destroy(other) == URLSPH_OK);
+    CHECK(urlsph_destroy(twin) == URLSPH_OK);
+    CHECK(urlsph_destroy(s) == URLSPH_OK);
+}
+
 /* What the callbacks of a test share. */
 struct witness {
     urlsph_simulation *s;
@@ -1264,6 +1344,7 @@ int main(int argc, char **argv) {
     RUN(resultants);
     RUN(contact);
     RUN(snapshots);
+    RUN(snapshot_files);
     RUN(callbacks);
     RUN(busy);
     RUN(many_threads);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -190,6 +191,17 @@ void snapshots() {
     const urlsph::Error e = thrown(
         [&] { s.restore(std::vector<std::uint8_t>(saved.begin(), saved.end() - 1)); });
     CHECK(e.code() == URLSPH_SNAPSHOT && s.state_hash() == there);
+
+    const std::string path = (std::filesystem::temp_directory_path() /
+                              ("urlsph-" + std::to_string(there) + ".snapshot")).string();
+    s.save_snapshot(path);
+    s.restore(saved);
+    s.restore_snapshot(path);
+    CHECK(s.state_hash() == there);
+    CHECK(std::filesystem::remove(path));
+    CHECK(thrown([&] { s.restore_snapshot(path); }).code() == URLSPH_IO);
+    CHECK(thrown([&] { s.save_snapshot(path + "/in/it"); }).code() == URLSPH_IO);
+    CHECK(s.state_hash() == there);
 }
 
 void callbacks() {

@@ -46,6 +46,18 @@
 #define URLSPH_VERSION_MINOR 1
 #define URLSPH_VERSION_PATCH 0
 
+// Stands before a function that a later version of the binary interface will not have; the note says
+// what to use instead. Define it as nothing to be spared the compiler's warning.
+#ifndef URLSPH_DEPRECATED
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+#define URLSPH_DEPRECATED(note) [[deprecated(note)]]
+#elif defined(__GNUC__)
+#define URLSPH_DEPRECATED(note) __attribute__((deprecated(note)))
+#else
+#define URLSPH_DEPRECATED(note)
+#endif
+#endif
+
 
 // Version of the binary interface. It changes only when programs have to be compiled again; it is
 // the number in the library's soname. Additions do not change it.
@@ -922,6 +934,29 @@ urlsph_status urlsph_save_snapshot(const struct urlsph_simulation *simulation,
 urlsph_status urlsph_restore_snapshot(struct urlsph_simulation *simulation,
                                       const uint8_t *buffer,
                                       size_t size);
+
+// Writes the complete state to a file: what `urlsph_save_snapshot` copies, byte by byte.
+//
+// The file gets its name only when all of it is on the disk: neither a full disk nor a killed
+// process leaves half a snapshot there, or takes away the one before.
+//
+// - `path`: NUL-terminated UTF-8. Beside it a file of this name with `.part` at its end comes and
+//   goes.
+//
+// Errors: `URLSPH_IO` naming the file; the simulation is as it was, and can go on.
+// `URLSPH_INVALID_ARGUMENT`, `URLSPH_OUT_OF_MEMORY`, `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+urlsph_status urlsph_save_snapshot_to_file(const struct urlsph_simulation *simulation,
+                                           const char *path);
+
+// Returns to the state of a snapshot in a file.
+//
+// - `path`: NUL-terminated UTF-8; what `urlsph_save_snapshot_to_file` wrote, or the bytes of
+//   `urlsph_save_snapshot`, of a simulation of the same scene.
+//
+// Errors: those of `urlsph_restore_snapshot`, and `URLSPH_IO` naming the file; nothing is changed
+// then.
+urlsph_status urlsph_restore_snapshot_from_file(struct urlsph_simulation *simulation,
+                                                const char *path);
 
 // Hash of the complete state: equal states have equal hashes, whatever the number of threads.
 //

@@ -338,6 +338,14 @@ public:
     void restore(Span<std::uint8_t> snapshot) {
         check(urlsph_restore_snapshot(handle_, snapshot.data(), snapshot.size()));
     }
+    /// Writes the complete state to a file, which is there when all of it is, or stays as it was.
+    void save_snapshot(const std::string& path) const {
+        check(urlsph_save_snapshot_to_file(handle_, path.c_str()));
+    }
+    /// Returns to the complete state in a file.
+    void restore_snapshot(const std::string& path) {
+        check(urlsph_restore_snapshot_from_file(handle_, path.c_str()));
+    }
 
 private:
     /// Destroys the simulation. While a call is under way on it, from a callback of its own say, it

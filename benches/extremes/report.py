@@ -1,8 +1,9 @@
 """Tables and pictures of `cargo xtask extremes`.
 
-    python benches/extremes/report.py FOLDER
+    python benches/extremes/report.py FOLDER [EXPECTED.csv]
 
-reads FOLDER/results.json and writes results.csv, results.md, map.png and cfl.png beside it.
+reads FOLDER/results.json and writes results.csv, results.md, map.png and cfl.png beside it; or says which runs ended in
+another way than those of EXPECTED.csv did.
 """
 
 import csv
@@ -189,9 +190,25 @@ def draw_cfl(rows, path):
     save(figure, path)
 
 
-def main(folder):
+def compare(rows, expected):
+    """Ends with status 1 if a run's outcome is not the expected one."""
+    with open(expected, newline="") as file:
+        known = {(row["sweep"], row["series"], float(row["value"])): row["outcome"] for row in csv.DictReader(file)}
+    changed = 0
+    for row in rows:
+        before = known.get((row["sweep"], row["series"], float(f"{row['value']:.4g}")))
+        if row["outcome"] != before:
+            changed += 1
+            print(f"{row['sweep']}, {row['series']}, {row['value']:g}: {row['outcome']} instead of {before} {row['message']}")
+    print(f"{len(rows)} runs, {changed} of them ended in another way than before: where that is meant, run `cargo xtask validate`")
+    sys.exit(changed > 0)
+
+
+def main(folder, expected=None):
     folder = Path(folder)
     rows = json.loads((folder / "results.json").read_text())
+    if expected:
+        compare(rows, expected)
     style()
     write_csv(rows, folder / "results.csv")
     write_tables(rows, folder / "results.md")

@@ -5,7 +5,7 @@ mod column;
 
 use std::fmt::Write as _;
 
-use rustix::time::{ClockId, clock_gettime};
+use cpu_time::ProcessTime;
 use urlsph::Simulation;
 
 use column::JITTER;
@@ -39,8 +39,7 @@ const PAIRS: usize = 20_000_000;
 const REPEATS: usize = 5;
 
 fn cpu_seconds() -> f64 {
-    let now = clock_gettime(ClockId::ProcessCPUTime);
-    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
+    ProcessTime::now().as_duration().as_secs_f64()
 }
 
 /// Least seconds of a piece of work.

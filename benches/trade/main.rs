@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use std::{fs, io, thread};
 
 use clap::Parser;
-use rustix::time::{ClockId, clock_gettime};
+use cpu_time::ProcessTime;
 use urlsph::{Scene, Simulation};
 
 use cases::{CASES, Case, Meter, Size, example};
@@ -72,8 +72,7 @@ fn names() -> clap::builder::PossibleValuesParser {
 
 /// CPU time of all threads of this process [s].
 fn cpu_seconds() -> f64 {
-    let now = clock_gettime(ClockId::ProcessCPUTime);
-    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
+    ProcessTime::now().as_duration().as_secs_f64()
 }
 
 /// The cases of `--quick`.

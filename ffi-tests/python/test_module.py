@@ -372,6 +372,33 @@ def test_snapshot(column):
     assert column.state_hash == there
 
 
+def test_snapshot_file(column, tmp_path):
+    column.step(1e-3)
+    path = tmp_path / "column.snapshot"
+    column.save_snapshot(path)
+    assert path.read_bytes() == column.snapshot()
+    here = column.state_hash
+    column.step(1e-3)
+    there = column.state_hash
+    column.restore_snapshot(str(path))
+    assert column.state_hash == here
+    column.step(1e-3)
+    assert column.state_hash == there
+
+    # What fails changes neither the state nor the folder.
+    with pytest.raises(OSError):
+        column.save_snapshot(tmp_path / "nowhere" / "column.snapshot")
+    with pytest.raises(OSError):
+        column.restore_snapshot(tmp_path / "nothing")
+    with pytest.raises(ValueError):
+        column.save_snapshot("a\0b")
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(urlsph.SnapshotError, match="column.snapshot"):
+        column.restore_snapshot(path)
+    assert column.state_hash == there
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_divergence(column):
     pull = np.zeros((9, 3))
     pull[0, 0], pull[4, 1] = 1e14, -1e14

@@ -1,8 +1,11 @@
 //! The complete state: snapshot, restore, hash.
 
-use super::args::{array, buffer, check, put};
-use super::handle::with;
+use std::ffi::c_char;
+
+use super::args::{array, buffer, check, put, text};
+use super::handle::{Session, with};
 use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
+use crate::error::Result;
 use crate::snapshot::Snapshot;
 
 /// Bytes that a snapshot of the present state takes.
@@ -65,16 +68,61 @@ pub unsafe extern "C" fn urlsph_restore_snapshot(
 ) -> urlsph_status {
     with(simulation, |session| {
         // SAFETY: the caller's pointer, as the header's preamble demands.
-        let snapshot = Snapshot::from_bytes(unsafe { array(buffer, size, "buffer")? })?;
-        let simulation = session.simulation_mut()?;
-        simulation.restore(&snapshot)?;
-        let time = simulation.time();
-        session
-            .callbacks
-            .log(urlsph_log_level::URLSPH_LOG_INFO, || {
-                format!("returned to {time:.6e} s")
-            });
-        Ok(())
+        let bytes = unsafe { array(buffer, size, "buffer")? };
+        restore(session, &Snapshot::from_bytes(bytes)?)
+    })
+}
+
+fn restore(session: &mut Session, snapshot: &Snapshot) -> Result<()> {
+    let simulation = session.simulation_mut()?;
+    simulation.restore(snapshot)?;
+    let time = simulation.time();
+    session
+        .callbacks
+        .log(urlsph_log_level::URLSPH_LOG_INFO, || {
+            format!("returned to {time:.6e} s")
+        });
+    Ok(())
+}
+
+/// Writes the complete state to a file: what `urlsph_save_snapshot` copies, byte by byte.
+///
+/// The file gets its name only when all of it is on the disk: neither a full disk nor a killed
+/// process leaves half a snapshot there, or takes away the one before.
+///
+/// - `path`: NUL-terminated UTF-8. Beside it a file of this name with `.part` at its end comes and
+///   goes.
+///
+/// Errors: `URLSPH_IO` naming the file; the simulation is as it was, and can go on.
+/// `URLSPH_INVALID_ARGUMENT`, `URLSPH_OUT_OF_MEMORY`, `URLSPH_BUSY`, `URLSPH_INTERNAL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_save_snapshot_to_file(
+    simulation: *const urlsph_simulation,
+    path: *const c_char,
+) -> urlsph_status {
+    with(simulation, |session| {
+        // SAFETY: the caller's pointer, as the header's preamble demands.
+        let path = unsafe { text(path, "path")? };
+        session.simulation()?.snapshot().write(path)
+    })
+}
+
+/// Returns to the state of a snapshot in a file.
+///
+/// - `path`: NUL-terminated UTF-8; what `urlsph_save_snapshot_to_file` wrote, or the bytes of
+///   `urlsph_save_snapshot`, of a simulation of the same scene.
+///
+/// Errors: those of `urlsph_restore_snapshot`, and `URLSPH_IO` naming the file; nothing is changed
+/// then.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn urlsph_restore_snapshot_from_file(
+    simulation: *mut urlsph_simulation,
+    path: *const c_char,
+) -> urlsph_status {
+    with(simulation, |session| {
+        // SAFETY: the caller's pointer, as the header's preamble demands.
+        let path = unsafe { text(path, "path")? };
+        restore(session, &Snapshot::read(path)?)
     })
 }
 

@@ -1,9 +1,7 @@
 //! Asked for an accuracy: whether the error that is announced holds the true one, from the reference
 //! solutions of the cases.
 
-use std::time::Duration;
-
-use rustix::time::{ClockId, clock_gettime};
+use cpu_time::ProcessTime;
 use urlsph::accuracy::{Ask, Band, Report, Run, Search, Series, Task};
 use urlsph::{Control, Scene, Simulation};
 
@@ -215,8 +213,7 @@ fn slab_at(xi: f64, time: f64) -> f64 {
 
 /// CPU time of this process [s].
 fn cpu_seconds() -> f64 {
-    let now = clock_gettime(ClockId::ProcessCPUTime);
-    Duration::new(now.tv_sec as u64, now.tv_nsec as u32).as_secs_f64()
+    ProcessTime::now().as_duration().as_secs_f64()
 }
 
 /// What came of a question: the report and the true error of its final run, or why it was refused.

@@ -345,6 +345,7 @@ impl Setup {
     }
 }
 
-fn compiler() -> String {
+/// The C compiler.
+pub fn compiler() -> String {
     std::env::var("CC").unwrap_or_else(|_| "cc".to_owned())
 }

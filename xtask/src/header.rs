@@ -32,28 +32,43 @@ pub fn header(sh: &Shell, check: bool) -> Result<()> {
 }
 
 fn generate() -> Result<String> {
-    let root = project::root();
-    let mut config = cbindgen::Config::from_file(root.join("cbindgen.toml"))
-        .map_err(anyhow::Error::msg)
-        .context("cbindgen.toml")?;
-    config.after_includes = Some(version_macros());
-    let mut builder = cbindgen::Builder::new().with_config(config);
+    let mut builder = cbindgen::Builder::new().with_config(config()?);
     for source in SOURCES {
-        builder = builder.with_src(root.join(format!("src/ffi/{source}.rs")));
+        builder = builder.with_src(project::root().join(format!("src/ffi/{source}.rs")));
     }
     let mut bytes = Vec::new();
     builder.generate()?.write(&mut bytes);
     Ok(String::from_utf8(bytes)?)
 }
 
-fn version_macros() -> String {
+fn config() -> Result<cbindgen::Config> {
+    let mut config = cbindgen::Config::from_file(project::root().join("cbindgen.toml"))
+        .map_err(anyhow::Error::msg)
+        .context("cbindgen.toml")?;
+    config.after_includes = Some(macros());
+    Ok(config)
+}
+
+fn macros() -> String {
     // The workspace has one version: this package's is the library's.
     format!(
         "\n// Version of this header; `urlsph_version` tells the library's.\n\
          #define URLSPH_VERSION \"{}\"\n\
          #define URLSPH_VERSION_MAJOR {}\n\
          #define URLSPH_VERSION_MINOR {}\n\
-         #define URLSPH_VERSION_PATCH {}\n",
+         #define URLSPH_VERSION_PATCH {}\n\
+         \n\
+         // Stands before a function that a later version of the binary interface will not have; the note says\n\
+         // what to use instead. Define it as nothing to be spared the compiler's warning.\n\
+         #ifndef URLSPH_DEPRECATED\n\
+         #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L\n\
+         #define URLSPH_DEPRECATED(note) [[deprecated(note)]]\n\
+         #elif defined(__GNUC__)\n\
+         #define URLSPH_DEPRECATED(note) __attribute__((deprecated(note)))\n\
+         #else\n\
+         #define URLSPH_DEPRECATED(note)\n\
+         #endif\n\
+         #endif\n",
         env!("CARGO_PKG_VERSION"),
         env!("CARGO_PKG_VERSION_MAJOR"),
         env!("CARGO_PKG_VERSION_MINOR"),
@@ -72,4 +87,44 @@ fn pyproject(text: &str) -> Result<String> {
         &format!("version = \"{}\"", env!("CARGO_PKG_VERSION")),
         1,
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use xshell::cmd;
+
+    use super::*;
+    use crate::ffi_tests::compiler;
+
+    #[test]
+    fn a_compiler_warns_of_what_is_deprecated() {
+        let sh = project::shell().unwrap();
+        let folder = sh.create_temp_dir().unwrap();
+        let folder = folder.path();
+        let source = folder.join("old.rs");
+        let old = "#[deprecated(note = \"use urlsph_new\")]\n#[unsafe(no_mangle)]\npub extern \"C\" fn urlsph_old() {}\n";
+        sh.write_file(&source, old).unwrap();
+        cbindgen::Builder::new()
+            .with_config(config().unwrap())
+            .with_src(&source)
+            .generate()
+            .unwrap()
+            .write_to_file(folder.join("old.h"));
+        let program = folder.join("program.c");
+        sh.write_file(
+            &program,
+            "#include \"old.h\"\nint main(void) { urlsph_old(); }\n",
+        )
+        .unwrap();
+        let cc = compiler();
+        let said = |options: &[&str]| {
+            let command = cmd!(
+                sh,
+                "{cc} -std=c11 -Werror -fsyntax-only {options...} {program}"
+            );
+            String::from_utf8(command.quiet().ignore_status().output().unwrap().stderr).unwrap()
+        };
+        assert!(said(&[]).contains("use urlsph_new"), "{}", said(&[]));
+        assert_eq!(said(&["-DURLSPH_DEPRECATED(note)="]), "");
+    }
 }

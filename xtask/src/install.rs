@@ -32,13 +32,13 @@ impl SharedLibrary {
         Ok(if cfg!(target_os = "macos") {
             Self {
                 plain: "liburlsph.dylib".into(),
-                soname: format!("liburlsph.{MAJOR}.dylib"),
+                soname: Self::soname(MAJOR),
                 full: format!("liburlsph.{VERSION}.dylib"),
             }
         } else if cfg!(unix) {
             Self {
                 plain: "liburlsph.so".into(),
-                soname: format!("liburlsph.so.{MAJOR}"),
+                soname: Self::soname(MAJOR),
                 full: format!("liburlsph.so.{VERSION}"),
             }
         } else {
@@ -46,6 +46,15 @@ impl SharedLibrary {
                 "only Unix systems have a prefix to install to: link target/release/urlsph.dll.lib and include include/urlsph.h"
             )
         })
+    }
+
+    /// As programs built against this version of the binary interface look for it at run time.
+    pub fn soname(abi_version: &str) -> String {
+        if cfg!(target_os = "macos") {
+            format!("liburlsph.{abi_version}.dylib")
+        } else {
+            format!("liburlsph.so.{abi_version}")
+        }
     }
 }
 

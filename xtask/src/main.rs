@@ -1,8 +1,10 @@
 //! The project's tasks: `cargo xtask <task>`.
 
+mod abi;
 mod bench;
 mod counts;
 mod demo;
+mod deny;
 mod extremes;
 mod ffi_tests;
 mod fmu_tests;
@@ -14,6 +16,7 @@ mod peer;
 mod project;
 mod tally;
 mod test;
+mod tools;
 mod validate;
 mod venv;
 mod wheel;
@@ -26,12 +29,16 @@ const HELP: &str = "\
 Usage: cargo xtask <TASK>
 
 Tasks:
+  abi         Programs built against an earlier release run with this library; --freeze keeps header and
+              symbols of the present version (ffi-tests/abi/README.md)
   bench       Speed against accuracy: cases with reference solutions over resolution and numerics, as
               JSON, CSV and a report under target/bench/; --quick takes a minute (bench --help)
   counts      Instructions, memory, pair-updates and errors against those expected; --update makes the
               present ones the expected ones (benches/counts/README.md)
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
+  deny        Licences, duplicates, sources and known vulnerabilities of what this is built from, and whether
+              README.md names it all; the vulnerabilities come from GitHub
   extremes    Where the method breaks: sweeps of loads, materials, particles and units, as tables and a map under
               target/extremes/ (benches/extremes/README.md)
   ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
@@ -63,8 +70,11 @@ fn run(arguments: &[String]) -> Result<()> {
     let sh = project::shell()?;
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments.as_slice() {
+        ["abi"] => abi::abi(&sh),
+        ["abi", "--freeze"] => abi::freeze(&sh),
         ["bench", arguments @ ..] => bench::bench(&sh, arguments),
         ["counts", arguments @ ..] => counts::counts(&sh, arguments),
+        ["deny"] => deny::deny(&sh),
         ["demo"] => demo::demo(&sh),
         ["extremes", arguments @ ..] => extremes::extremes(&sh, arguments),
         ["ffi-tests"] => ffi_tests::run(&sh),

@@ -5,8 +5,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
+use crate::abi::abi_tests;
 use crate::bench::bench_tests;
 use crate::counts::counts_tests;
+use crate::deny::deny_tests;
+use crate::extremes::extremes_tests;
 use crate::ffi_tests::ffi_tests;
 use crate::fmu_tests::fmu_tests;
 use crate::output_tests::output_tests;
@@ -22,10 +25,13 @@ const PARTS: &[Part] = &[
     ("lints", lints),
     ("no features", no_features),
     ("documentation", documentation),
+    ("dependencies", deny_tests),
     ("rust", rust),
     ("output files", output_tests),
     ("bench", bench_tests),
+    ("extremes", extremes_tests),
     ("counts", counts_tests),
+    ("abi", abi_tests),
     ("C, C++, Python", ffi_tests),
     ("fmu", fmu_tests),
     ("peer", peer_tests),

@@ -273,6 +273,8 @@ _SIGNATURES = {
     "urlsph_get_snapshot_size": [_HANDLE, POINTER(c_size_t)],
     "urlsph_save_snapshot": [_HANDLE, POINTER(c_uint8), c_size_t, POINTER(c_size_t)],
     "urlsph_restore_snapshot": [_HANDLE, c_char_p, c_size_t],
+    "urlsph_save_snapshot_to_file": [_HANDLE, c_char_p],
+    "urlsph_restore_snapshot_from_file": [_HANDLE, c_char_p],
     "urlsph_get_state_hash": [_HANDLE, POINTER(c_uint64)],
 }
 

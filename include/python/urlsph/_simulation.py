@@ -751,6 +751,14 @@ class Simulation:
         snapshot = bytes(snapshot)
         self._change(lib.urlsph_restore_snapshot, snapshot, len(snapshot))
 
+    def save_snapshot(self, path: Union[str, "os.PathLike[str]"]) -> None:
+        """Writes the complete state to a file, which is there when all of it is, or stays as it was."""
+        self._call(lib.urlsph_save_snapshot_to_file, _c_text(os.fspath(path)))
+
+    def restore_snapshot(self, path: Union[str, "os.PathLike[str]"]) -> None:
+        """Returns to a snapshot in a file, of a simulation of the same scene."""
+        self._change(lib.urlsph_restore_snapshot_from_file, _c_text(os.fspath(path)))
+
 
 def _c_text(text: str) -> bytes:
     data = text.encode()
