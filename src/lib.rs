@@ -38,6 +38,7 @@
 //! ```
 
 pub mod accuracy;
+mod aside;
 mod boundary;
 pub mod error;
 pub mod ffi;

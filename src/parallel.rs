@@ -3,12 +3,12 @@
 //! Slabs depend on the number of particles alone, so that every sum has the same order, and the
 //! results the same bits, whatever the number of threads.
 
-use std::panic::resume_unwind;
 use std::sync::{Mutex, PoisonError};
-use std::thread::{self, JoinHandle, ScopedJoinHandle};
+use std::thread::{self, JoinHandle};
 
 use rayon::prelude::*;
 
+use crate::aside::aside;
 use crate::error::{Code, Error, Result};
 
 /// Beginning of the names of the pools' threads.
@@ -36,21 +36,24 @@ impl Pool {
             pool: None,
             threads: Vec::new(),
         };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .spawn_handler(|thread| {
-                let name = format!("{THREAD_NAME_PREFIX}{}", thread.index());
-                let builder = thread::Builder::new().name(name);
-                this.threads.push(builder.spawn(|| thread.run())?);
-                Ok(())
-            })
-            .build()
-            .map_err(|e| {
-                Error::new(
-                    Code::OutOfMemory,
-                    format!("the thread pool did not start: {e}"),
-                )
-            })?;
+        // Not from the caller's thread, so that a host can unload the library.
+        let pool = aside(|| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .spawn_handler(|thread| {
+                    let name = format!("{THREAD_NAME_PREFIX}{}", thread.index());
+                    let builder = thread::Builder::new().name(name);
+                    this.threads.push(builder.spawn(|| thread.run())?);
+                    Ok(())
+                })
+                .build()
+        })
+        .map_err(|e| {
+            Error::new(
+                Code::OutOfMemory,
+                format!("the thread pool did not start: {e}"),
+            )
+        })?;
         this.pool = Some(pool);
         Ok(this)
     }
@@ -74,19 +77,7 @@ impl Pool {
         if rayon::current_thread_index().is_none() || pool.current_thread_index().is_some() {
             return pool.install(work);
         }
-        let (mut work, mut done) = (Some(work), None);
-        let mut run = || done = work.take().map(|work| pool.install(work));
-        let waited = thread::scope(|scope| {
-            let waiting = thread::Builder::new().spawn_scoped(scope, &mut run);
-            waiting.ok().map(ScopedJoinHandle::join)
-        });
-        match waited {
-            Some(Ok(())) => (),
-            Some(Err(panic)) => resume_unwind(panic),
-            // No thread could be had: better with the host's other work than not at all.
-            None => run(),
-        }
-        done.expect("the work was done")
+        aside(|| pool.install(work))
     }
 }
 

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
+from fmpy import extract
 
 from driver import ERROR, Driver, only_fmi3, status
+from raw import LOG3, Raw, library, threads_and_memory
 
 
 def test_wrong_phases(start):
@@ -113,68 +114,6 @@ def test_divergence_keeps_the_last_good_state(start):
     instance.time = 0.001
     instance.set("boundary.top.traction", [0.0, -1e3, 0.0])
     instance.step(0.01)
-
-
-def library(folder):
-    return ctypes.CDLL(str(next(Path(folder).glob("binaries/*/urlsph.*"))))
-
-
-LOG3 = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
-
-
-class Raw:
-    """The C functions without FMPy in between."""
-
-    def __init__(self, folder, version):
-        self.version, self.folder = version, Path(folder)
-        self.library = library(folder)
-        self.token = read_model_description(str(folder)).guid.encode()
-        self.messages = []
-        # Kept alive as long as the instances.
-        self.log3 = LOG3(lambda _, status, category, text: self.messages.append(
-            (status, category.decode(), text.decode())))
-
-    def __getitem__(self, name):
-        return self.library[f"fmi{self.version}{name}"]
-
-    def instantiate(self, name=b"raw", token=None, resources=..., log=True, kind=1):
-        token = self.token if token is None else token
-        if resources is ...:
-            path = self.folder / "resources"
-            resources = (path.as_uri() if self.version == 2 else str(path)).encode()
-        function = self["Instantiate" if self.version == 2 else "InstantiateCoSimulation"]
-        function.restype = c_void_p
-        if self.version == 2:
-            # Without a logger; some importers pass no functions at all.
-            return function(c_char_p(name), kind, c_char_p(token), c_char_p(resources), None, 0, 0)
-        return function(
-            c_char_p(name), c_char_p(token), c_char_p(resources), c_bool(False), c_bool(False),
-            c_bool(False), c_bool(False), None, c_size_t(0), None,
-            self.log3 if log else None, None)
-
-    def call(self, name, instance, *arguments):
-        return self[name](c_void_p(instance), *arguments)
-
-    def initialize(self, instance):
-        if self.version == 2:
-            # No fmi2SetupExperiment: some importers leave it out.
-            assert self.call("EnterInitializationMode", instance) == 0
-        else:
-            assert self.call(
-                "EnterInitializationMode", instance, c_bool(False), c_double(0), c_double(0),
-                c_bool(False), c_double(0)) == 0
-        assert self.call("ExitInitializationMode", instance) == 0
-
-    def step(self, instance, point, size):
-        if self.version == 2:
-            return self.call("DoStep", instance, c_double(point), c_double(size), 0)
-        # All results may be NULL.
-        return self.call(
-            "DoStep", instance, c_double(point), c_double(size), c_bool(False), None, None, None,
-            None)
-
-    def free(self, instance):
-        self["FreeInstance"](c_void_p(instance))
 
 
 @pytest.fixture
@@ -342,14 +281,6 @@ def test_a_logger_that_calls_back(raw):
     raw.free(instance)
 
 
-def threads_and_memory():
-    """What this process has; a thread that was joined takes a moment to leave the count."""
-    time.sleep(0.2)
-    with open("/proc/self/status") as file:
-        fields = dict(line.split(":", 1) for line in file if ":" in line)
-    return int(fields["Threads"]), int(fields["VmRSS"].split()[0]) * 1024
-
-
 def test_instances_come_and_go_without_a_trace(raw):
     def live(times):
         for _ in range(times):
@@ -366,18 +297,6 @@ def test_instances_come_and_go_without_a_trace(raw):
     print(f"{threads} -> {threads_after} threads; memory grew by {growth} bytes, tolerance 4 MB")
     assert threads_after == threads
     assert growth < 4e6
-
-
-def test_the_library_is_loaded_again_and_again(export, version):
-    """Importers unpack an FMU to a new folder each time, so the library is a new one each time."""
-    threads = []
-    for _ in range(10):
-        instance = Driver(export("column", version))
-        instance.initialize()
-        instance.step(0.001)
-        instance.free()
-        threads.append(threads_and_memory()[0])
-    assert threads[-1] == threads[0]
 
 
 def test_instances_in_one_process(start):

@@ -31,6 +31,20 @@ pub fn fmu_tests(sh: &Shell) -> Result<Tally> {
     Ok(tally)
 }
 
+/// The library loaded 2,000 times, and a million calls of each kind on one instance.
+pub fn soak(sh: &Shell) -> Result<()> {
+    let python = venv::python(sh)?;
+    let urlsph = project::build(sh)?.join("urlsph");
+    cmd!(
+        sh,
+        "{python} -B -m pytest -q -s -p no:cacheprovider ffi-tests/python_fmi/test_soak.py"
+    )
+    .env("URLSPH", &urlsph)
+    .env("URLSPH_SOAK", "100")
+    .run()?;
+    Ok(())
+}
+
 /// examples/coupling_thermal: a film of ours and a substrate of somebody else, both FMUs. The script
 /// checks what must hold.
 fn thermal_coupling(sh: &Shell, python: &Path, urlsph: &Path) -> Result<()> {

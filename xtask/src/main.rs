@@ -51,7 +51,8 @@ Tasks:
   peer        Time and errors beside LAMMPS' Smooth Mach Dynamics, one core each; the report is
               target/peer/report.md. Options: benches/peer/README.md
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
-  validate    The long comparisons with reference solutions, with residuals and tolerances, and the extremes
+  validate    The long comparisons with reference solutions, with residuals and tolerances, the extremes, and an
+              FMU loaded 2,000 times and called a million times
   wheel       The Python package with the library inside, in target/wheel/
 ";
 

@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use xshell::{Shell, cmd};
 
 use crate::extremes;
+use crate::fmu_tests::soak;
 use crate::tally::Tally;
 
 /// Where the tables of the last validation are kept.
@@ -50,5 +51,6 @@ pub fn validate(sh: &Shell) -> Result<()> {
     sh.write_file(RESULTS, results)?;
     println!("Tables: {RESULTS}");
     extremes::update(sh)?;
+    soak(sh)?;
     Ok(())
 }
