@@ -379,7 +379,7 @@ impl Instance {
     /// Whether a state is one of this FMU.
     ///
     /// # Errors
-    /// [`Code::Snapshot`] if it is not.
+    /// [`Code::Snapshot`] if it is not, or has a number that is not finite.
     pub fn check_state(&self, state: &State) -> Result<()> {
         let fits = state.token == self.table.token
             && state.parameters.len() == self.parameters.len()
@@ -389,12 +389,21 @@ impl Instance {
                 .iter()
                 .zip(&self.inputs)
                 .all(|(a, b)| a.len() == b.len());
-        if fits {
+        if !fits {
+            return Err(Error::new(
+                Code::Snapshot,
+                "the FMU state belongs to another FMU: use one that this FMU has made",
+            ));
+        }
+        let times = state.stop.iter().chain([&state.start]);
+        let values = state.parameters.iter().chain(state.inputs.iter().flatten());
+        // Bytes from outside can have a good checksum and bad numbers.
+        if times.chain(values).all(|number| number.is_finite()) {
             Ok(())
         } else {
             Err(Error::new(
                 Code::Snapshot,
-                "the FMU state belongs to another FMU: use one that this FMU has made",
+                "the FMU state has a number that is not finite: use one that this FMU has made",
             ))
         }
     }

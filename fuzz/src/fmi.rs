@@ -489,7 +489,9 @@ impl Importer {
                 Call::Missing { count, what } => {
                     let n = (*count).max(1);
                     let no = null_mut();
-                    match (standard, what % 8) {
+                    // Where there is an array, but none can be as long.
+                    let (mut value, long) = (0.0, n | 1 << 61);
+                    match (standard, what % 9) {
                         (Two, 0) => fmi2GetReal(i, null(), n, null_mut()),
                         (Two, 1) => fmi2SetReal(i, null(), n, null()),
                         (Two, 2) => fmi2GetRealStatus(i, 2, null_mut()),
@@ -506,6 +508,8 @@ impl Importer {
                             fmi2DeSerializeFMUstate,
                             fmi3DeserializeFMUState(i, null(), n, &mut self.state)
                         ),
+                        (Two, 7) => fmi2SetReal(i, &0, long, &value),
+                        (Three, 7) => fmi3GetFloat64(i, &0, 1, &mut value, long),
                         _ => of!(
                             standard,
                             fmi2SerializeFMUstate,

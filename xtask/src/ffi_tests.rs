@@ -1,5 +1,5 @@
 //! The tests of the C ABI: C11, C++17 and Python programs against an installed library, shared and
-//! static, and with sanitizers; the examples in C and C++.
+//! static, with sanitizers and under valgrind; the examples in C and C++.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -18,8 +18,9 @@ const SCENES: [&str; 3] = [
 ];
 
 /// Whatever valgrind reports fails the program.
-const MEMCHECK: [&str; 6] = [
+const MEMCHECK: [&str; 7] = [
     "--quiet",
+    "--suppressions=ffi-tests/valgrind.supp",
     "--fair-sched=yes",
     "--leak-check=full",
     "--errors-for-leak-kinds=definite,indirect,possible",

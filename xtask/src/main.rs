@@ -31,7 +31,7 @@ Tasks:
               present ones the expected ones (benches/counts/README.md)
   demo        Build the library, package a column as an FMU, co-simulate it two-way from Python;
               fields, histories and pictures under target/demo/
-  ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
+  ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, sanitizers, valgrind, examples
   fmu-tests   The tests of the FMUs from Python alone, and the thermal coupling of two FMUs
   fuzz        [TARGET...] [--seconds N] [--minimise]: coverage-guided fuzzing of scene, mesh, snapshot, calls
               and fmi (fuzz/README.md)
@@ -40,7 +40,7 @@ Tasks:
               files
   peer        Time and errors beside LAMMPS' Smooth Mach Dynamics, one core each; the report is
               target/peer/report.md. Options: benches/peer/README.md
-  test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
+  test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI, a short fuzzing
   validate    The long comparisons with reference solutions, with residuals and tolerances
   wheel       The Python package with the library inside, in target/wheel/
 ";
