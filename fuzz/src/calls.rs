@@ -166,7 +166,7 @@ impl Host {
         let handles = self.handles.lock().expect("no panic while it is held");
         match handles.get(usize::from(number) % (handles.len() + 1)) {
             Some(handle) => *handle as *mut urlsph_simulation,
-            None if number % 2 == 0 => null_mut(),
+            None if number.is_multiple_of(2) => null_mut(),
             None => (usize::from(number) << 4) as *mut urlsph_simulation,
         }
     }

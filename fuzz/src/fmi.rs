@@ -647,7 +647,7 @@ unsafe fn make_another(
         1 => c"".as_ptr(),
         n => model.tokens[usize::from(n) - 2].as_ptr(),
     };
-    let name = if what % 2 == 0 {
+    let name = if what.is_multiple_of(2) {
         null()
     } else {
         c"n\xffme".as_ptr()
