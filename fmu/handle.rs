@@ -497,20 +497,27 @@ fn internal(panic: &str) -> Error {
 
 /// What is said about a NULL array.
 pub(super) fn null_array() -> Error {
-    Error::argument("an array is NULL: pass one of the given length")
+    Error::argument(
+        "an array is NULL, not aligned, or longer than memory can be: pass one of the given length",
+    )
 }
 
-/// An array of the importer; NULL only if it is empty.
+/// Whether an array can be where and as long as the importer says.
+fn is_possible<T>(data: *const T, length: usize) -> bool {
+    !data.is_null() && data.is_aligned() && length <= isize::MAX as usize / size_of::<T>()
+}
+
+/// An array of the importer; NULL only if it is empty. `None` if it cannot be one.
 ///
 /// # Safety
 /// `data` is NULL or has `length` elements that nobody writes meanwhile.
 pub(super) unsafe fn slice<'a, T>(data: *const T, length: usize) -> Option<&'a [T]> {
     if length == 0 {
         Some(&[])
-    } else if data.is_null() || !data.is_aligned() {
+    } else if !is_possible(data, length) {
         None
     } else {
-        // SAFETY: not NULL, aligned, and long enough by the caller's promise.
+        // SAFETY: not NULL, aligned, of a possible size, and long enough by the caller's promise.
         Some(unsafe { std::slice::from_raw_parts(data, length) })
     }
 }
@@ -522,10 +529,10 @@ pub(super) unsafe fn slice<'a, T>(data: *const T, length: usize) -> Option<&'a [
 pub(super) unsafe fn slice_mut<'a, T>(data: *mut T, length: usize) -> Option<&'a mut [T]> {
     if length == 0 {
         Some(&mut [])
-    } else if data.is_null() || !data.is_aligned() {
+    } else if !is_possible(data, length) {
         None
     } else {
-        // SAFETY: not NULL, aligned, and long enough by the caller's promise.
+        // SAFETY: not NULL, aligned, of a possible size, and long enough by the caller's promise.
         Some(unsafe { std::slice::from_raw_parts_mut(data, length) })
     }
 }
@@ -671,6 +678,17 @@ mod tests {
             error.to_string().contains("/no/such/place/scene.json"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn impossible_arrays_are_refused() {
+        let one = 1.0_f64;
+        // SAFETY: none of these leads to a slice.
+        unsafe {
+            assert!(slice::<f64>(std::ptr::null(), 1).is_none());
+            assert!(slice(&one, usize::MAX).is_none());
+            assert!(slice_mut(std::ptr::without_provenance_mut::<f64>(1), 1).is_none());
+        }
     }
 
     #[test]

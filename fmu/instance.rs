@@ -379,7 +379,7 @@ impl Instance {
     /// Whether a state is one of this FMU.
     ///
     /// # Errors
-    /// [`Code::Snapshot`] if it is not.
+    /// [`Code::Snapshot`] if it is not, or has a number that is not finite.
     pub fn check_state(&self, state: &State) -> Result<()> {
         let fits = state.token == self.table.token
             && state.parameters.len() == self.parameters.len()
@@ -389,12 +389,21 @@ impl Instance {
                 .iter()
                 .zip(&self.inputs)
                 .all(|(a, b)| a.len() == b.len());
-        if fits {
+        if !fits {
+            return Err(Error::new(
+                Code::Snapshot,
+                "the FMU state belongs to another FMU: use one that this FMU has made",
+            ));
+        }
+        let times = state.stop.iter().chain([&state.start]);
+        let values = state.parameters.iter().chain(state.inputs.iter().flatten());
+        // Bytes from outside can have a good checksum and bad numbers.
+        if times.chain(values).all(|number| number.is_finite()) {
             Ok(())
         } else {
             Err(Error::new(
                 Code::Snapshot,
-                "the FMU state belongs to another FMU: use one that this FMU has made",
+                "the FMU state has a number that is not finite: use one that this FMU has made",
             ))
         }
     }
@@ -521,4 +530,39 @@ fn start_inputs(table: &Table) -> Vec<Vec<f64>> {
         .iter()
         .filter(|v| matches!(v.slot, Slot::Input(_)));
     of_inputs.filter_map(|v| v.start.clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_with_a_number_that_is_not_finite_is_refused() {
+        const SCENE: &str = r#"{
+            "geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 1}},
+            "material": {"neo_hookean": {"density": 1000, "youngs_modulus": 1e7, "poisson_ratio": 0.3}},
+            "boundary": {"y_max": {"traction": {"external": [0, 0, 0]}}},
+            "time": {"end": 1}
+        }"#;
+        let simulation = Simulation::new(Scene::from_json(SCENE, &[]).unwrap()).unwrap();
+        let token = Table::new(&simulation, FmiVersion::V3).unwrap().token;
+        let folder = Path::new("");
+        let mut instance = Instance::new(FmiVersion::V3, SCENE.to_owned(), folder, &token).unwrap();
+        let good = instance.state().unwrap();
+        let spoil: [fn(&mut State); 4] = [
+            |state| state.start = f64::NAN,
+            |state| state.stop = Some(f64::INFINITY),
+            |state| state.parameters[0] = f64::NAN,
+            |state| state.inputs[0][0] = f64::NEG_INFINITY,
+        ];
+        for spoil in spoil {
+            let mut bad = good.clone();
+            spoil(&mut bad);
+            // As from an importer that has stored it.
+            let bad = State::from_bytes(&bad.to_bytes()).unwrap();
+            let error = instance.restore(&bad).unwrap_err();
+            assert_eq!(error.code(), Code::Snapshot);
+        }
+        instance.restore(&good).unwrap();
+    }
 }

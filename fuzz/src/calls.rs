@@ -1,6 +1,6 @@
 //! Sequences of calls of the C ABI, with whatever arguments, from two threads.
 
-use std::ffi::{CString, c_char, c_void};
+use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicI32, Ordering};
@@ -8,14 +8,14 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use arbitrary::{Arbitrary, Unstructured};
 use urlsph::ffi::*;
 
-use crate::number::Number;
+use super::number::Number;
 
 const SCENES: [&str; 4] = [
-    r#"{"geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.5}},
+    r#"{"geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 1}},
         "material": {"neo_hookean": {"density": 1000, "youngs_modulus": 1e7, "poisson_ratio": 0.3}},
         "boundary": {"y_min": {"support": "clamped"}, "y_max": {"traction": {"external": [0, 0, 0]}}},
-        "probes": {"tip": [0.5, 1, 0.5]}, "time": {"end": 1}}"#,
-    r#"{"geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.5}},
+        "probes": {"tip": [0, 1, 0]}, "time": {"end": 1}}"#,
+    r#"{"geometry": {"box": {"min": [0, 0, 0], "max": [0.5, 0.5, 1], "spacing": 0.5}},
         "material": {"von_mises": {"density": 1000, "youngs_modulus": 1e7, "poisson_ratio": 0.3, "yield_stress": 1e5}},
         "heat": {"specific_heat": 100, "reference_temperature": 300, "conductivity": 10},
         "boundary": {"y_min": {"velocity": {"external": [0, 0, 0]}}, "x_min": {"temperature": {"external": 300}},
@@ -54,7 +54,9 @@ enum Call {
     Create {
         scene: u8,
         threads: Size,
-        keep_error: bool,
+        overrides: Vec<Vec<u8>>,
+        options_size: Option<Size>,
+        error_size: Option<Size>,
     },
     CreateFromFile(Vec<u8>),
     Destroy,
@@ -74,6 +76,7 @@ enum Call {
     AdvanceTo(Number),
     Callbacks {
         observing: bool,
+        size: Option<Size>,
     },
     Save {
         room: Option<Size>,
@@ -99,7 +102,10 @@ enum Call {
         what: u8,
         index: Size,
         size: Size,
+        /// Bytes by which the output is not aligned.
+        shift: u8,
     },
+    LastError(Option<Size>),
     View(Size),
 }
 
@@ -109,18 +115,31 @@ struct Host {
     snapshot: Mutex<Vec<u8>>,
     /// Steps that a call may still make.
     patience: AtomicI32,
+    /// Whether there is no other thread.
+    alone: bool,
 }
 
 unsafe extern "C" fn cancel(host: *mut c_void) -> i32 {
     // SAFETY: the host outlives its handles.
     let host = unsafe { &*host.cast::<Host>() };
+    for number in 0..3 {
+        let mut time = 0.0;
+        // SAFETY: any handle will do; the one whose callback this is answers that it is busy.
+        unsafe { urlsph_get_time(host.handle(number), &mut time) };
+    }
     i32::from(host.patience.fetch_sub(1, Ordering::Relaxed) <= 0)
 }
 
 unsafe extern "C" fn log(_: urlsph_log_level, message: *const c_char, _: *mut c_void) {
     // SAFETY: a NUL-terminated text for the time of the call.
-    let text = unsafe { std::ffi::CStr::from_ptr(message) };
+    let text = unsafe { CStr::from_ptr(message) };
     assert!(!text.is_empty());
+}
+
+/// A text without the NUL that ends it elsewhere.
+fn c_text(bytes: &[u8]) -> CString {
+    let bytes: Vec<u8> = bytes.iter().filter(|b| **b != 0).copied().collect();
+    CString::new(bytes).expect("no NUL")
 }
 
 /// A buffer with a mark behind its end, which no call may pass.
@@ -147,16 +166,31 @@ impl Host {
         let handles = self.handles.lock().expect("no panic while it is held");
         match handles.get(usize::from(number) % (handles.len() + 1)) {
             Some(handle) => *handle as *mut urlsph_simulation,
-            None if number % 2 == 0 => null_mut(),
+            None if number.is_multiple_of(2) => null_mut(),
             None => (usize::from(number) << 4) as *mut urlsph_simulation,
         }
     }
 
     fn make(&self, number: u8, call: &Call) {
         let s = self.handle(number);
+        let hash = || {
+            let mut hash = 0;
+            // SAFETY: any handle will do.
+            unsafe { urlsph_get_state_hash(s, &mut hash) };
+            hash
+        };
+        let before = self.alone.then(hash);
         // SAFETY: every pointer is NULL or valid for the length that goes with it.
         let status = unsafe { self.call(s, call) };
         assert_ne!(status, urlsph_status::URLSPH_INTERNAL, "{call:?}");
+        let may_change = match call {
+            Call::Step(_) | Call::AdvanceTo(_) | Call::Destroy => true,
+            Call::Set { .. } | Call::Restore { .. } => status == urlsph_status::URLSPH_OK,
+            _ => false,
+        };
+        if let (Some(before), false) = (before, may_change) {
+            assert_eq!(before, hash(), "{call:?} changed the state");
+        }
     }
 
     unsafe fn call(&self, s: *mut urlsph_simulation, call: &Call) -> urlsph_status {
@@ -165,30 +199,40 @@ impl Host {
             Call::Create {
                 scene,
                 threads,
-                keep_error,
+                overrides,
+                options_size,
+                error_size,
             } => {
                 let json =
                     CString::new(SCENES[usize::from(*scene) % SCENES.len()]).expect("no NUL");
-                let options = urlsph_options {
-                    overrides: null(),
-                    override_count: 0,
+                let overrides: Vec<CString> =
+                    overrides.iter().take(4).map(|text| c_text(text)).collect();
+                let overrides: Vec<*const c_char> = overrides.iter().map(|o| o.as_ptr()).collect();
+                let mut options: [urlsph_options; 2] = unsafe { std::mem::zeroed() };
+                options[0] = urlsph_options {
+                    overrides: overrides.as_ptr(),
+                    override_count: overrides.len(),
                     // Cores are few, and threads take long to start.
                     threads: match threads.value() {
                         n @ 0..40 => 1 + n % 2,
                         n => n.max(1025),
                     },
                 };
+                let options_size = options_size.map_or(size_of::<urlsph_options>(), |size| {
+                    size.at_most(size_of_val(&options))
+                });
                 let mut handle = null_mut();
                 let mut error: urlsph_error = unsafe { std::mem::zeroed() };
-                let (error, error_size) = match keep_error {
-                    true => (&raw mut error, size_of::<urlsph_error>()),
-                    false => (null_mut(), 0),
+                let most = size_of::<urlsph_error>();
+                let (error, error_size) = match error_size {
+                    Some(size) => (&raw mut error, size.at_most(most)),
+                    None => (null_mut(), 0),
                 };
                 let status = unsafe {
                     urlsph_create_from_json(
                         json.as_ptr(),
-                        &options,
-                        size_of::<urlsph_options>(),
+                        options.as_ptr(),
+                        options_size,
                         &mut handle,
                         error,
                         error_size,
@@ -209,9 +253,7 @@ impl Host {
                 status
             }
             Call::CreateFromFile(path) => {
-                let Ok(path) = CString::new(path.clone()) else {
-                    return urlsph_status::URLSPH_OK;
-                };
+                let path = c_text(path);
                 // A file that there is would be read: of these, none is a scene.
                 if std::path::Path::new(&*path.to_string_lossy()).exists() {
                     return urlsph_status::URLSPH_OK;
@@ -267,9 +309,12 @@ impl Host {
                 self.patience.store(5, Ordering::Relaxed);
                 unsafe { urlsph_advance_to(s, time.value(0.0)) }
             }
-            Call::Callbacks { observing } => {
+            Call::Callbacks { observing, size } => {
                 let callbacks = self.callbacks(*observing);
-                unsafe { urlsph_set_callbacks(s, &callbacks, size_of::<urlsph_callbacks>()) }
+                let whole = size_of::<urlsph_callbacks>();
+                // A smaller struct is refused: none is without the cancellation that ends a call.
+                let size = size.map_or(whole, |size| size.at_most(whole));
+                unsafe { urlsph_set_callbacks(s, &callbacks, size) }
             }
             Call::Save { room } => {
                 let status = unsafe { urlsph_get_snapshot_size(s, &mut index) };
@@ -300,13 +345,7 @@ impl Host {
                 unsafe { urlsph_restore_snapshot(s, bytes.as_ptr().cast(), size) }
             }
             Call::Find { what, name } => {
-                let name = CString::new(
-                    name.iter()
-                        .filter(|b| **b != 0)
-                        .copied()
-                        .collect::<Vec<u8>>(),
-                )
-                .expect("no NUL");
+                let name = c_text(name);
                 let name = name.as_ptr();
                 match what % 4 {
                     0 => unsafe { urlsph_find_patch(s, name, &mut index) },
@@ -335,12 +374,17 @@ impl Host {
                     }),
                 }
             }
-            Call::Ask { what, index, size } => {
+            Call::Ask {
+                what,
+                index,
+                size,
+                shift,
+            } => {
                 // Structs of any size that fits, as from a program of another version.
                 let (index, size) = (index.value(), size.at_most(ROOM));
-                let mut number = 0_u64;
                 within(ROOM, 0_u64, |room| unsafe {
-                    match what % 16 {
+                    let room = room.cast::<u8>().add(usize::from(shift % 8));
+                    match what % 19 {
                         0 => urlsph_get_counts(s, room.cast(), size),
                         1 => urlsph_get_time(s, room.cast()),
                         2 => urlsph_get_end_time(s, room.cast()),
@@ -356,13 +400,41 @@ impl Host {
                         12 => urlsph_get_probe_info(s, index, room.cast(), size),
                         13 => urlsph_get_probe_motion(s, index, room.cast(), size),
                         14 => urlsph_get_input_info(s, index, room.cast(), size),
-                        _ => urlsph_get_state_hash(s, &mut number),
+                        15 => urlsph_get_state_hash(s, room.cast()),
+                        16 => urlsph_get_snapshot_size(s, room.cast()),
+                        17 => urlsph_get_generation(s, room.cast()),
+                        _ => urlsph_get_title(s, room.cast()),
                     }
                 })
             }
+            Call::LastError(size) => {
+                let mut error: urlsph_error = unsafe { std::mem::zeroed() };
+                let whole = size_of::<urlsph_error>();
+                let size = size.map_or(whole, |size| size.at_most(whole));
+                let status = unsafe { urlsph_get_last_error(s, &mut error, size) };
+                if status == urlsph_status::URLSPH_OK {
+                    let text = unsafe { CStr::from_ptr(error.text.as_ptr()) };
+                    text.to_str().expect("UTF-8");
+                }
+                status
+            }
             Call::View(field) => {
                 let mut view: urlsph_view = unsafe { std::mem::zeroed() };
-                unsafe { urlsph_get_view(s, field.value(), &mut view, size_of::<urlsph_view>()) }
+                let size = size_of::<urlsph_view>();
+                let status = unsafe { urlsph_get_view(s, field.value(), &mut view, size) };
+                // A call of another thread ends the loan.
+                if status == urlsph_status::URLSPH_OK && self.alone {
+                    let (order, stride) = (view.order, view.component_stride);
+                    for slot in 0..view.particles {
+                        let particle = unsafe { *order.add(slot) };
+                        assert!((particle as usize) < view.particles);
+                        for component in 0..view.components {
+                            let value = unsafe { *view.data.add(component * stride + slot) };
+                            assert!(!value.is_nan(), "a state is made of numbers");
+                        }
+                    }
+                }
+                status
             }
         }
     }
@@ -399,6 +471,7 @@ pub fn calls(data: &[u8]) {
     calls.truncate(40);
     beside.truncate(10);
     let host = Host {
+        alone: beside.is_empty(),
         handles: Mutex::new(Vec::new()),
         snapshot: Mutex::new(Vec::new()),
         patience: AtomicI32::new(0),
@@ -406,9 +479,12 @@ pub fn calls(data: &[u8]) {
     let first = Call::Create {
         scene: scene % 2,
         threads: Size::Small(0),
-        keep_error: false,
+        overrides: Vec::new(),
+        options_size: None,
+        error_size: None,
     };
     host.make(0, &first);
+    assert_ne!(host.handle(0), null_mut());
     std::thread::scope(|scope| {
         if !beside.is_empty() {
             scope.spawn(|| {

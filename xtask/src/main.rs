@@ -41,7 +41,7 @@ Tasks:
               README.md names it all; the vulnerabilities come from GitHub
   extremes    Where the method breaks: sweeps of loads, materials, particles and units, as tables and a map under
               target/extremes/ (benches/extremes/README.md)
-  ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, examples
+  ffi-tests   The tests of the C ABI alone: C, C++ and Python programs, sanitizers, valgrind, examples
   fmu-tests   The tests of the FMUs from Python alone, and the thermal coupling of two FMUs
   fuzz        [TARGET...] [--seconds N] [--minimise]: coverage-guided fuzzing of scene, mesh, snapshot, calls
               and fmi (fuzz/README.md)
@@ -50,7 +50,7 @@ Tasks:
               files
   peer        Time and errors beside LAMMPS' Smooth Mach Dynamics, one core each; the report is
               target/peer/report.md. Options: benches/peer/README.md
-  test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI
+  test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI, a short fuzzing
   validate    The long comparisons with reference solutions, with residuals and tolerances, the extremes, and an
               FMU loaded 2,000 times and called a million times
   wheel       The Python package with the library inside, in target/wheel/

@@ -12,6 +12,7 @@ use crate::deny::deny_tests;
 use crate::extremes::extremes_tests;
 use crate::ffi_tests::ffi_tests;
 use crate::fmu_tests::fmu_tests;
+use crate::fuzz::fuzz_tests;
 use crate::output_tests::output_tests;
 use crate::peer::peer_tests;
 use crate::tally::Tally;
@@ -35,6 +36,7 @@ const PARTS: &[Part] = &[
     ("C, C++, Python", ffi_tests),
     ("fmu", fmu_tests),
     ("peer", peer_tests),
+    ("fuzz", fuzz_tests),
 ];
 
 pub fn test(sh: &Shell) -> Result<()> {
