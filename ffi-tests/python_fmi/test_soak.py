@@ -12,6 +12,9 @@ from raw import Raw, threads_and_memory
 
 FACTOR = int(os.environ.get("URLSPH_SOAK", "1"))
 LOADS = 20 * FACTOR
+# What a load leaves [bytes]: statics of two dependencies, a regular expression and the records of a collector, which
+# nothing frees when a library is unloaded.
+LEFT = 40_000
 CALLS = 10_000 * FACTOR
 
 
@@ -42,21 +45,22 @@ def test_loads_at_fresh_paths(unpacked, version, tmp_path):
     live(warm, warm + LOADS)
     threads_after, memory_after = threads_and_memory()
     growth = memory_after - memory
-    print(f"{LOADS} loads: {threads} -> {threads_after} threads; memory grew by {growth} bytes, tolerance 4 MB")
+    tolerance = 1e6 + LEFT * LOADS
+    print(f"{LOADS} loads: {threads} -> {threads_after} threads; memory grew by {growth} bytes, tolerance {tolerance:g}")
     assert threads_after == threads
-    assert growth < 4e6
+    assert growth < tolerance
 
 
 @only_fmi3
 def test_calls_without_end(start):
     """Set, step and get of one instance."""
-    instance = start("driven")
-    reference = instance.variables["boundary.top.velocity"].valueReference
+    instance = start("column")
+    reference = instance.variables["boundary.top.traction"].valueReference
     energy = instance.variables["energy.kinetic"].valueReference
 
     def live(times):
         for n in range(times):
-            instance.fmu.setFloat64([reference], [1e-6 * (n % 7), 0.0, 0.0])
+            instance.fmu.setFloat64([reference], [100.0 * (n % 7), 0.0, 0.0])
             instance.step(1e-6)
             assert instance.fmu.getFloat64([energy])[0] >= 0.0
 
