@@ -9,7 +9,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use super::table::Table;
 use super::{FmiVersion, MODEL_IDENTIFIER, description, documentation};
 use crate::error::{Code, Error, Result};
-use crate::output::replace_file;
+use crate::output::{io_error, replace_file};
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 
@@ -51,7 +51,7 @@ pub fn package(scene: &Scene, version: FmiVersion, library: &Path, out: &Path) -
     let scene_text = serde_json::to_string_pretty(&packed).map_err(|e| {
         Error::new(
             Code::Internal,
-            format!("the scene cannot be written as JSON: {e}"),
+            format!("the scene cannot be written as JSON: {e}; please report this bug"),
         )
     })?;
     let mut files: Vec<(String, Vec<u8>)> = vec![
@@ -143,7 +143,7 @@ pub fn find_library() -> Result<PathBuf> {
             Err(Error::new(
                 Code::Io,
                 format!(
-                    "{LIBRARY_VARIABLE} is {}, which is not a file",
+                    "{LIBRARY_VARIABLE} is {}, which is not a file: set it to the shared library",
                     given.display()
                 ),
             ))
@@ -152,7 +152,10 @@ pub fn find_library() -> Result<PathBuf> {
     let program = std::env::current_exe().map_err(|e| {
         Error::new(
             Code::Io,
-            format!("the place of the program is unknown: {e}"),
+            format!(
+                "the place of the program is unknown: {e}; name the library in the environment variable \
+                 {LIBRARY_VARIABLE}"
+            ),
         )
     })?;
     let folder = program.parent().unwrap_or(Path::new(""));
@@ -181,8 +184,7 @@ pub fn find_library() -> Result<PathBuf> {
 
 /// Reads the library and checks that it is one of ours, of this version.
 fn read_library(path: &Path) -> Result<Vec<u8>> {
-    let bytes = std::fs::read(path)
-        .map_err(|e| Error::new(Code::Io, format!("cannot read `{}`: {e}", path.display())))?;
+    let bytes = std::fs::read(path).map_err(|e| io_error("read", path, &e))?;
     let found = bytes
         .windows(MARK.len())
         .any(|window| window == MARK.as_bytes());

@@ -53,7 +53,7 @@ fn unit(variable: &Variable) -> Result<&'static UnitRow> {
             Error::new(
                 Code::Internal,
                 format!(
-                    "{} has the unit {}, which has no definition",
+                    "{} has the unit {}, which has no definition; please report this bug",
                     variable.name, variable.unit
                 ),
             )
@@ -86,7 +86,12 @@ pub(super) fn document(body: impl FnOnce(&mut Xml) -> io::Result<()>) -> Result<
         .and_then(|()| body(&mut xml))
         .and_then(|()| String::from_utf8(xml.into_inner()).map_err(io::Error::other))
         .map(|text| text + "\n")
-        .map_err(|e| Error::new(Code::Internal, format!("writing XML failed: {e}")))
+        .map_err(|e| {
+            Error::new(
+                Code::Internal,
+                format!("writing XML failed: {e}; please report this bug"),
+            )
+        })
 }
 
 /// An element without content.

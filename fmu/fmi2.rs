@@ -22,6 +22,8 @@ type Boolean = c_int;
 
 /// `fmi2CoSimulation`.
 const CO_SIMULATION: c_int = 1;
+pub(super) const NOT_CO_SIMULATION: &str =
+    "this FMU is for co-simulation: instantiate it with fmi2CoSimulation";
 /// `fmi2LastSuccessfulTime`.
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated`.
@@ -82,8 +84,7 @@ unsafe extern "C" fn fmi2Instantiate(
     let logger = callbacks
         .and_then(|c| c.logger.map(|f| Logger::V2(f, c.environment)))
         .unwrap_or(Logger::None);
-    let refusal = (kind != CO_SIMULATION)
-        .then_some("this FMU is for co-simulation: instantiate it with fmi2CoSimulation");
+    let refusal = (kind != CO_SIMULATION).then_some(NOT_CO_SIMULATION);
     // SAFETY: by the standard.
     unsafe {
         handle::instantiate(
@@ -292,7 +293,7 @@ unsafe extern "C" fn fmi2GetRealStatus(instance: Pointer, kind: c_int, value: *m
     let body = |i: &mut Instance| {
         if kind != LAST_SUCCESSFUL_TIME {
             return Err(Error::argument(
-                "the only real status is fmi2LastSuccessfulTime",
+                "there is no such real status: ask for fmi2LastSuccessfulTime",
             ));
         }
         // SAFETY: by the standard.
@@ -311,7 +312,9 @@ unsafe extern "C" fn fmi2GetBooleanStatus(
 ) -> Status {
     let body = |_: &mut Instance| {
         if kind != TERMINATED {
-            return Err(Error::argument("the only boolean status is fmi2Terminated"));
+            return Err(Error::argument(
+                "there is no such boolean status: ask for fmi2Terminated",
+            ));
         }
         // The FMU never ends a simulation by itself.
         // SAFETY: by the standard.

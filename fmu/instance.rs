@@ -206,7 +206,8 @@ impl Instance {
             && end > stop + slack
         {
             return Err(Error::argument(format!(
-                "the step ends at {end} s, beyond the stop time {stop} s of the experiment"
+                "the step ends at {end} s, beyond the stop time {stop} s of the experiment: make it \
+                 shorter, or set a later stop time"
             )));
         }
         self.update()?;
@@ -310,7 +311,7 @@ impl Instance {
                 }
                 Slot::Time | Slot::Output(_) => {
                     return Err(Error::argument(format!(
-                        "{} is computed: it cannot be set",
+                        "{} is computed and cannot be set: set parameters and inputs only",
                         variable.name
                     )));
                 }
@@ -428,7 +429,7 @@ impl Instance {
         });
         let Some((index, element)) = found else {
             return Err(Error::argument(format!(
-                "there is no variable with the value reference {reference}"
+                "there is no variable with the value reference {reference}: modelDescription.xml lists them"
             )));
         };
         let variable = &self.table.variables[index];
@@ -436,7 +437,7 @@ impl Instance {
         let v2 = self.table.version == FmiVersion::V2;
         if variable.kind != kind && !(v2 && variable.kind != Kind::Real && kind != Kind::Real) {
             return Err(Error::argument(format!(
-                "{} (value reference {reference}) is of another type",
+                "{} (value reference {reference}) is of another type: modelDescription.xml tells which",
                 variable.name
             )));
         }
@@ -464,9 +465,12 @@ impl Instance {
             _ => None,
         };
         Err(Error::argument(match what {
-            Some(name) => format!("{name} has {expected} values, but {length} are given"),
+            Some(name) => {
+                format!("{name} has {expected} values, but {length} are given: pass all of them")
+            }
             None => format!(
-                "the {} variables have {expected} values together, but {length} are given",
+                "the {} variables have {expected} values together, but {length} are given: pass all of \
+                 them",
                 references.len()
             ),
         }))

@@ -27,6 +27,9 @@ mod instance;
 mod state;
 mod table;
 
+#[cfg(test)]
+mod tests;
+
 pub use archive::{find_library, package};
 pub use description::model_description;
 

@@ -234,7 +234,7 @@ fn scene_tree(scene: &Scene) -> Result<Value> {
     serde_json::to_value(scene).map_err(|e| {
         Error::new(
             Code::Internal,
-            format!("the scene cannot be written as JSON: {e}"),
+            format!("the scene cannot be written as JSON: {e}; please report this bug"),
         )
     })
 }

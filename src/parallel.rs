@@ -51,7 +51,7 @@ impl Pool {
         .map_err(|e| {
             Error::new(
                 Code::OutOfMemory,
-                format!("the thread pool did not start: {e}"),
+                format!("the thread pool did not start: {e}; ask for fewer threads"),
             )
         })?;
         this.pool = Some(pool);

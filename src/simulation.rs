@@ -419,7 +419,11 @@ impl Simulation {
             };
             if observer(&progress) == Control::Cancel {
                 return Err(
-                    Error::new(Code::Cancelled, "cancelled by the caller").at_time(self.time)
+                    Error::new(
+                        Code::Cancelled,
+                        "cancelled by the caller: the last whole step is kept, and the run can go on from it",
+                    )
+                    .at_time(self.time)
                 );
             }
         }
@@ -973,7 +977,8 @@ impl Simulation {
         if !same_shape {
             return Err(Error::new(
                 Code::Snapshot,
-                "the snapshot does not have the fields of its scene: it is damaged",
+                "the snapshot does not have the fields of its scene, it is damaged: take it again from a \
+                 running simulation",
             ));
         }
         for (index, values) in snapshot.inputs.iter().enumerate() {
@@ -1008,7 +1013,8 @@ impl Simulation {
             pool.install(|| reference.rebuild()).map_err(|slot| {
                 Error::new(
                     Code::Snapshot,
-                    "the reference configuration of the snapshot is damaged",
+                    "the reference configuration of the snapshot is damaged: take it again from a \
+                     running simulation",
                 )
                 .at_particle(self.order[slot - Layout::FIRST] as usize, None)
             })?;
@@ -1042,7 +1048,8 @@ impl Probes {
                     .min_by(|(_, x), (_, y)| distance(x).total_cmp(&distance(y)));
                 let error = Error::scene(
                     format!("probes.{name}"),
-                    "the point lies outside the body; the nearest particle is named here",
+                    "the probe lies outside the body: give a point inside it, in the initial \
+                     configuration; the nearest particle is named here",
                 );
                 match nearest {
                     Some((i, x)) => error.at_particle(particles.caller(i), Some(*x)),

@@ -76,7 +76,7 @@ trait Walk {
         match present {
             0 => *array = None,
             1 => self.array(array.get_or_insert_with(|| Array::new(layout, dummy)))?,
-            _ => return Err(damaged("an unknown flag")),
+            _ => return Err(damaged("it has an unknown flag")),
         }
         Ok(())
     }
@@ -181,7 +181,10 @@ impl Snapshot {
         if !about.is_file() {
             return Err(Error::new(
                 Code::Io,
-                format!("cannot read `{}`: it is no file", path.display()),
+                format!(
+                    "cannot read `{}`: it is no file; name the file of a snapshot",
+                    path.display()
+                ),
             ));
         }
         let mut bytes = Vec::new();
@@ -190,7 +193,8 @@ impl Snapshot {
             Error::new(
                 Code::OutOfMemory,
                 format!(
-                    "the snapshot `{}` has {length} bytes: more than there is memory for",
+                    "the snapshot `{}` has {length} bytes, more than there is memory for: is it the file \
+                     that was meant?",
                     path.display()
                 ),
             )
@@ -340,5 +344,65 @@ impl Walk for Reader<'_> {
             *v = f64::from_le_bytes(b.try_into().expect("eight bytes"));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Simulation;
+
+    const CUBE: &str = r#"{
+        "geometry": {"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.5}},
+        "material": {"neo_hookean": {"density": 1, "youngs_modulus": 1, "poisson_ratio": 0}},
+        "numerics": {"reference_update": "every_step", "operators": "kernel", "kernel_option": 3},
+        "time": {"end": 1}
+    }"#;
+
+    #[test]
+    fn parts_that_do_not_fit_are_told_with_the_remedy() {
+        let scene = Scene::from_json(CUBE, &[]).unwrap();
+        let mut simulation = Simulation::with_threads(scene, 1).unwrap();
+        simulation.advance(0.1).unwrap();
+        let good = simulation.snapshot();
+        let mut told = |change: fn(&mut Snapshot)| {
+            let mut bad = good.clone();
+            change(&mut bad);
+            let error = simulation.restore(&bad).unwrap_err();
+            assert_eq!(error.code(), Code::Snapshot);
+            error
+        };
+        let error = told(|bad| bad.walls.push(WallState::default()));
+        assert!(
+            error
+                .message()
+                .contains("does not have the fields of its scene")
+        );
+        let error = told(|bad| {
+            let updated = bad.updated.as_mut().unwrap();
+            updated.chi = Array::new(updated.chi.layout(), [0.0; 3]);
+        });
+        assert!(
+            error
+                .message()
+                .contains("reference configuration of the snapshot is damaged")
+        );
+        assert!(error.place().particle.is_some());
+        assert_eq!(simulation.state_hash(), good.hash(), "nothing has changed");
+
+        // Every word of the head in turn, under a checksum that is right.
+        let bytes = good.to_bytes();
+        let mut texts = String::new();
+        for at in (16..bytes.len() - 16).step_by(8) {
+            let mut bad = bytes[..bytes.len() - 8].to_vec();
+            bad[at..at + 8].fill(0xff);
+            let sum = xxh3_64(&bad);
+            bad.extend_from_slice(&sum.to_le_bytes());
+            if let Err(error) = Snapshot::from_bytes(&bad) {
+                texts += error.message();
+            }
+        }
+        assert!(texts.contains("a length in it is absurd"), "{texts}");
+        assert!(texts.contains("it has an unknown flag"), "{texts}");
     }
 }

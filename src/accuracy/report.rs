@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::model::Band;
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::output::{ACCURACY, replace_file};
 
 /// What a run costs.
@@ -91,7 +91,10 @@ impl Report {
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         let path = folder.join(ACCURACY);
         let text = serde_json::to_string_pretty(self).map_err(|cause| {
-            Error::argument(format!("a report does not turn into JSON: {cause}"))
+            Error::new(
+                Code::Internal,
+                format!("the report cannot be written as JSON: {cause}; please report this bug"),
+            )
         })?;
         replace_file(&path, |out| writeln!(out, "{text}"))?;
         Ok(path)

@@ -548,6 +548,7 @@ mod tests {
         let refused = drive(&mut search(1e-5, 60.0).unwrap(), |size| 0.02 * size * size);
         let message = refused.unwrap_err().to_string();
         println!("{message}");
+        assert!(message.contains(", which they reach, or raise the budget"));
         let reachable = message.split("ask for ").nth(1).unwrap();
         let share: f64 = reachable.split(" %").next().unwrap().parse().unwrap();
         drive(&mut search(share / 100.0, 60.0).unwrap(), |size| {
@@ -563,11 +564,16 @@ mod tests {
         });
         let message = refused.unwrap_err().to_string();
         println!("{message}");
-        assert!(message.contains("budget"), "{message}");
+        assert!(message.contains("; the next pilot, "), "{message}");
+        assert!(message.contains("raise the budget"), "{message}");
         // Without a budget in the way the number of runs ends it.
         let refused = drive(&mut search(0.01, 1e300).unwrap(), |size| 0.1 / size);
         let message = refused.unwrap_err().to_string();
         assert!(message.contains("after 16 runs"), "{message}");
+        assert!(
+            message.contains("; choose a quantity that varies more smoothly"),
+            "{message}"
+        );
         assert!(message.contains("too slowly"), "{message}");
     }
 
@@ -597,6 +603,37 @@ mod tests {
             .failed(&task, Error::new(Code::Cancelled, "cancelled"))
             .unwrap_err();
         assert_eq!(error.code(), Code::Cancelled);
+        assert!(error.message().contains("(in the run with "), "{error}");
+    }
+
+    #[test]
+    fn what_is_beyond_the_memory_says_what_asks_for_it() {
+        let refused = drive(&mut search(1e-7, 1e300).unwrap(), |size| 0.02 * size * size);
+        let error = refused.unwrap_err();
+        println!("{error}");
+        assert_eq!(error.code(), Code::OutOfMemory);
+        let note = " takes: ask for less accuracy";
+        assert!(error.message().contains(note), "{error}");
+    }
+
+    #[test]
+    fn final_runs_that_miss_the_tolerance_are_told() {
+        let mut search = search(0.01, 1e300).unwrap();
+        let error = loop {
+            match search.next_task() {
+                // A final run is worse than what the pilots foretell.
+                Ok(Some(task)) => {
+                    let size = task.level().size;
+                    let worse = 1.5 - 0.5 * f64::from(matches!(task, Task::Pilot(_)));
+                    search.succeeded(&task, run(size, 0.02 * worse * size * size));
+                }
+                Ok(None) => panic!("it is good enough"),
+                Err(error) => break error,
+            }
+        };
+        println!("{error}");
+        let text = " have missed it: the error of the last one is between ";
+        assert!(error.message().contains(text), "{error}");
     }
 
     #[test]

@@ -12,11 +12,13 @@ use crate::error::{Error, Result};
 /// NULL and alignment.
 pub(super) fn check<T>(pointer: *const T, name: &str) -> Result<()> {
     if pointer.is_null() {
-        return Err(Error::argument(format!("`{name}` is NULL")));
+        return Err(Error::argument(format!(
+            "`{name}` is NULL: pass a valid pointer"
+        )));
     }
     if !pointer.is_aligned() {
         return Err(Error::argument(format!(
-            "`{name}` is not aligned to {} bytes",
+            "`{name}` is not aligned to {} bytes: pass a pointer to a variable of its type",
             align_of::<T>()
         )));
     }
@@ -30,7 +32,7 @@ pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a 
     let bytes = unsafe { CStr::from_ptr(pointer) };
     bytes.to_str().map_err(|e| {
         Error::argument(format!(
-            "`{name}` is not UTF-8: byte {} does not fit",
+            "`{name}` is not UTF-8: byte {} does not fit; convert the text",
             e.valid_up_to()
         ))
     })
@@ -44,7 +46,7 @@ pub(super) unsafe fn array<'a, T>(pointer: *const T, count: usize, name: &str) -
     check(pointer, name)?;
     if count > isize::MAX as usize / size_of::<T>() {
         return Err(Error::argument(format!(
-            "`{name}`: {count} elements exceed the address space"
+            "`{name}`: {count} elements exceed the address space; check the count"
         )));
     }
     // SAFETY: not NULL, aligned, of a possible size; the caller vouches for the memory.
@@ -62,7 +64,7 @@ pub(super) unsafe fn buffer<'a, T: bytemuck::Zeroable>(
 ) -> Result<&'a mut [T]> {
     if capacity < needed {
         return Err(Error::argument(format!(
-            "`{name}` has room for {capacity} elements, but {needed} are needed"
+            "`{name}` has room for {capacity} elements, but {needed} are needed: pass a larger buffer"
         )));
     }
     if needed == 0 {

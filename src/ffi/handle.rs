@@ -44,8 +44,12 @@ pub(super) struct FieldNames {
 impl Names {
     fn new(simulation: &Simulation) -> Result<Self> {
         let text = |path: &str, s: &str| {
-            CString::new(s)
-                .map_err(|_| Error::scene(path, "a name must not contain the character U+0000"))
+            CString::new(s).map_err(|_| {
+                Error::scene(
+                    path,
+                    "a text must not contain the character U+0000: remove it",
+                )
+            })
         };
         Ok(Self {
             title: text("title", &simulation.scene().title)?,
@@ -121,7 +125,7 @@ impl Session {
 }
 
 fn destroyed() -> Error {
-    Error::argument("the simulation was destroyed")
+    Error::argument("the simulation was destroyed during the call: let its users end first")
 }
 
 /// The live handles. Ids count up and are never used again: a stale handle cannot meet a newer one.
@@ -253,5 +257,24 @@ pub(super) fn destroy(handle: *mut urlsph_simulation) -> urlsph_status {
     match panic::catch(move || drop(simulation)) {
         Ok(()) => urlsph_status::URLSPH_OK,
         Err(_) => urlsph_status::URLSPH_INTERNAL,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_call_that_comes_too_late_is_told() {
+        let scene = crate::scene::Scene::from_json(include_str!("../../ffi-tests/scene.json"), &[]);
+        let simulation = Simulation::with_threads(scene.expect("a scene"), 1).expect("a body");
+        let handle = register(simulation).expect("a handle");
+        let found = find(handle).expect("live");
+        assert_eq!(destroy(handle), urlsph_status::URLSPH_OK);
+        let error = found.lock().expect("not poisoned").simulation().err();
+        let error = error.expect("it is gone");
+        assert_eq!(error.code(), Code::InvalidArgument);
+        let text = "the simulation was destroyed during the call";
+        assert!(error.message().starts_with(text), "{error}");
     }
 }

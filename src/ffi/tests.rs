@@ -176,3 +176,116 @@ fn contact_is_that_of_the_library() {
     // SAFETY: handles may be anything.
     assert_eq!(unsafe { urlsph_destroy(handle) }, urlsph_status::URLSPH_OK);
 }
+
+#[test]
+fn what_is_wrong_with_a_call_is_told_with_the_remedy() {
+    let s = create();
+    let told = |status: urlsph_status, text: &str| {
+        let (code, message) = last_error(s);
+        println!("{message}");
+        assert_eq!(status, code, "{message}");
+        assert_eq!(code, urlsph_status::URLSPH_INVALID_ARGUMENT, "{message}");
+        assert!(message.contains(text), "no {text:?} in: {message}");
+    };
+    let (mut index, mut number, mut many) = (0, 0.0, [0.0; 8]);
+    let (latin, none) = (c"t\xf6p".as_ptr(), ptr::null());
+    let odd = ptr::from_mut(&mut many)
+        .cast::<u8>()
+        .wrapping_add(1)
+        .cast::<f64>();
+    let field = std::mem::size_of::<urlsph_field_info>();
+    let mut info = MaybeUninit::<urlsph_field_info>::uninit();
+    let mut view = MaybeUninit::<urlsph_view>::uninit();
+    let mut heat = MaybeUninit::<urlsph_heat_resultant>::uninit();
+    let mut callbacks = [0_u8; 2 * size_of::<urlsph_callbacks>()];
+    callbacks[size_of::<urlsph_callbacks>()] = 1;
+    let callbacks = callbacks.as_ptr_range();
+    // SAFETY: valid pointers, or such as the call refuses.
+    unsafe {
+        told(
+            urlsph_get_time(s, ptr::null_mut()),
+            "`time` is NULL: pass a valid pointer",
+        );
+        told(
+            urlsph_get_time(s, odd),
+            "`time` is not aligned to 8 bytes: pass a pointer to a variable of its type",
+        );
+        told(
+            urlsph_find_patch(s, latin, &mut index),
+            "`name` is not UTF-8: byte 1 does not fit; convert the text",
+        );
+        told(
+            urlsph_find_patch(s, c"lid".as_ptr(), &mut index),
+            "there is no patch `lid`; there are",
+        );
+        told(
+            urlsph_find_field(s, c"colour".as_ptr(), &mut index),
+            "there is no field `colour`; there are: ",
+        );
+        told(
+            urlsph_find_patch(s, none, &mut index),
+            "`name` is NULL: pass a valid pointer",
+        );
+        told(
+            urlsph_set_traction(s, 0, many.as_ptr(), usize::MAX),
+            " elements exceed the address space; check the count",
+        );
+        told(
+            urlsph_read_field(s, 0, many.as_mut_ptr(), 1),
+            " are needed: pass a larger buffer",
+        );
+        told(
+            urlsph_get_field_info(s, 0, info.as_mut_ptr(), 1),
+            "`info_size` is 1; pass the size of the struct, ",
+        );
+        told(
+            urlsph_get_field_info(s, 999, info.as_mut_ptr(), field),
+            "there is no field 999: there are ",
+        );
+        told(
+            urlsph_set_pressure(s, 999, &1.0, 1),
+            "there is no patch 999: there are ",
+        );
+        told(
+            urlsph_set_callbacks(s, callbacks.start.cast(), 2 * size_of::<urlsph_callbacks>()),
+            "`callbacks` asks for something that library version ",
+        );
+        told(
+            urlsph_read_input(s, 0, 99, &mut number, 1, &mut index),
+            "99 is not a quantity: give one of urlsph_quantity, such as URLSPH_TRACTION",
+        );
+        told(
+            urlsph_get_heat_resultant(s, 0, heat.as_mut_ptr(), size_of::<urlsph_heat_resultant>()),
+            "no heat flows here: the body has no temperature; add a section `heat` to the scene",
+        );
+        assert_eq!(
+            urlsph_find_field(s, c"pressure".as_ptr(), &mut index),
+            urlsph_status::URLSPH_OK
+        );
+        told(
+            urlsph_get_view(s, index, view.as_mut_ptr(), size_of::<urlsph_view>()),
+            "it is computed on demand and has no memory to look at: copy it with urlsph_read_field",
+        );
+        told(
+            urlsph_set_convection(s, 0, ptr::null(), 0, ptr::null(), 0),
+            "there is nothing to set: give `coefficients`, `ambient_temperatures`, or both",
+        );
+        told(urlsph_step(s, -1.0), " s; it must be finite and positive");
+        assert_eq!(urlsph_step(s, 1e-6), urlsph_status::URLSPH_OK);
+        told(
+            urlsph_step(s, 1e-300),
+            " s, too small to change the time in double precision",
+        );
+        assert_eq!(urlsph_destroy(s), urlsph_status::URLSPH_OK);
+    }
+    // JSON can name the character that ends a text in C.
+    let scene = crate::Scene::from_json(SCENE, &[r#"title="a\u0000b""#.to_owned()]);
+    let simulation = crate::Simulation::with_threads(scene.expect("a scene"), 1).expect("a body");
+    let error = handle::register(simulation).expect_err("no C string");
+    assert_eq!(error.code(), crate::Code::InvalidScene);
+    assert!(
+        error
+            .message()
+            .contains("a text must not contain the character U+0000: remove it")
+    );
+}

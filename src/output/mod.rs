@@ -81,3 +81,29 @@ pub(crate) fn io_error(action: &str, path: &Path, cause: &io::Error) -> Error {
         format!("cannot {action} `{}`: {cause}{remedy}", path.display()),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hint_follows_the_reason() {
+        for (kind, hint) in [
+            (io::ErrorKind::NotFound, "; does the folder exist?"),
+            (io::ErrorKind::PermissionDenied, "; is the folder writable?"),
+            (
+                io::ErrorKind::StorageFull,
+                "; free some space or write fewer fields less often",
+            ),
+            (io::ErrorKind::TimedOut, ""),
+        ] {
+            let error = io_error("write", Path::new("r/history.csv"), &kind.into());
+            assert_eq!(error.code(), Code::Io);
+            let text = format!(
+                "cannot write `r/history.csv`: {}{hint}",
+                io::Error::from(kind)
+            );
+            assert_eq!(error.message(), text);
+        }
+    }
+}

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::variables::{self, OutputVariable, Reader, selected_fields};
 use super::{Collection, History, io_error, replace_file, write_vtu};
-use crate::error::{Error, Result};
+use crate::error::{Code, Error, Result};
 use crate::fields::Field;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
@@ -126,7 +126,10 @@ impl Recorder {
             Before::Beginning => History::resume(path, columns, time)?,
         };
         let resolved = serde_json::to_string_pretty(scene).map_err(|cause| {
-            Error::argument(format!("the scene does not turn into JSON: {cause}"))
+            Error::new(
+                Code::Internal,
+                format!("the scene cannot be written as JSON: {cause}; please report this bug"),
+            )
         })?;
         replace_file(&folder.join("scene.json"), |out| {
             writeln!(out, "{resolved}")

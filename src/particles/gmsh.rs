@@ -147,7 +147,7 @@ impl<'a> Reader<'a> {
     fn truncated(&self) -> Error {
         self.wrong(
             self.bytes.len(),
-            "the file ends in the middle: it is truncated",
+            "the file ends in the middle, it is truncated: save or copy it again",
         )
     }
 
@@ -269,7 +269,9 @@ impl<'a> Reader<'a> {
                 }
                 "Nodes" => {
                     if nodes {
-                        return Err(self.wrong(place, "a second section $Nodes"));
+                        return Err(
+                            self.wrong(place, "there is a second section $Nodes: remove it")
+                        );
                     }
                     nodes = true;
                     if raw.modern {
@@ -300,7 +302,10 @@ impl<'a> Reader<'a> {
             }
         }
         if !nodes {
-            return Err(self.wrong(self.bytes.len(), "the file has no section $Nodes"));
+            return Err(self.wrong(
+                self.bytes.len(),
+                "the file has no section $Nodes: save the mesh again",
+            ));
         }
         Ok(raw)
     }
@@ -330,7 +335,7 @@ impl<'a> Reader<'a> {
         if size != "8" {
             return Err(self.wrong(
                 self.at,
-                format!("numbers of {size} bytes are not supported, only of 8"),
+                format!("numbers of {size} bytes are not supported, only of 8: {WANTED}"),
             ));
         }
         self.line();
@@ -340,21 +345,29 @@ impl<'a> Reader<'a> {
                 let one = i32::from_ne_bytes(self.raw()?);
                 self.swapped = one == 1i32.swap_bytes();
                 if one != 1 && !self.swapped {
-                    return Err(self.wrong(self.at, "the mark of the byte order is damaged"));
+                    return Err(self.wrong(
+                        self.at,
+                        "the mark of the byte order is damaged: save the mesh again",
+                    ));
                 }
                 self.binary = true;
             }
             _ => {
                 return Err(self.wrong(
                     self.at,
-                    format!("expected the file type 0 or 1 instead of {kind}"),
+                    format!(
+                        "expected the file type 0 (text) or 1 (binary) instead of {kind}: {WANTED}"
+                    ),
                 ));
             }
         }
         self.skip_space();
         let place = self.at;
         if self.line() != "$EndMeshFormat" {
-            return Err(self.wrong(place, "expected $EndMeshFormat"));
+            return Err(self.wrong(
+                place,
+                "$MeshFormat does not end with $EndMeshFormat: save the mesh again",
+            ));
         }
         Ok(())
     }
@@ -370,7 +383,8 @@ impl<'a> Reader<'a> {
                 self.line();
                 Ok(())
             }
-            None => Err(self.wrong(place, format!("the section ${name} does not end"))),
+            None => Err(self.wrong(place, format!("the section ${name} does not end with $End{name}: the file is truncated or damaged"),
+            )),
         }
     }
 
@@ -385,7 +399,8 @@ impl<'a> Reader<'a> {
                 .strip_prefix('"')
                 .and_then(|r| r.split_once('"'))
                 .map(|(name, _)| name.to_owned());
-            let name = name.ok_or_else(|| self.wrong(place, "expected a name in quotes"))?;
+            let name = name
+                .ok_or_else(|| self.wrong(place, "expected a name in quotes, such as \"top\""))?;
             raw.names.insert((dimension, tag), name);
         }
         Ok(())
@@ -422,7 +437,7 @@ impl<'a> Reader<'a> {
         if point.iter().any(|x| !x.is_finite()) {
             return Err(self.wrong(
                 place,
-                format!("node {tag} has a coordinate that is not finite"),
+                format!("node {tag} has a coordinate that is not finite: correct it in the mesh"),
             ));
         }
         raw.points.push(point);
@@ -433,7 +448,9 @@ impl<'a> Reader<'a> {
         if count >= u64::from(u32::MAX) {
             return Err(self.wrong(
                 self.at,
-                format!("{count} nodes are announced, at most 4.2e9 are possible"),
+                format!(
+                    "{count} nodes are announced, at most 4.2e9 are possible: coarsen the mesh"
+                ),
             ));
         }
         let room = self.room(count, 8);
@@ -450,8 +467,12 @@ impl<'a> Reader<'a> {
         for _ in 0..count {
             let place = self.place();
             let tag = self.int()?;
-            let tag = u64::try_from(tag)
-                .map_err(|_| self.wrong(place, format!("the node {tag} has a negative tag")))?;
+            let tag = u64::try_from(tag).map_err(|_| {
+                self.wrong(
+                    place,
+                    format!("the node {tag} has a negative tag: renumber the mesh"),
+                )
+            })?;
             raw.tags.push(tag);
             raw.point_places.push(place);
             self.node(raw, place, tag)?;
@@ -498,7 +519,7 @@ impl<'a> Reader<'a> {
             return Err(self.wrong(
                 self.at,
                 format!(
-                    "{count} nodes are announced, but the blocks hold {}",
+                    "{count} nodes are announced, but the blocks hold {}: save the mesh again",
                     raw.points.len()
                 ),
             ));
@@ -538,8 +559,14 @@ impl<'a> Reader<'a> {
                 self.size()?
             } else {
                 let node = self.int()?;
-                u64::try_from(node)
-                    .map_err(|_| self.wrong(place, format!("element {tag} has the node {node}")))?
+                u64::try_from(node).map_err(|_| {
+                    self.wrong(
+                        place,
+                        format!(
+                            "element {tag} has the node {node}, a negative tag: renumber the mesh"
+                        ),
+                    )
+                })?
             };
             if n < corners {
                 element.corners[n] = node;
@@ -593,7 +620,9 @@ impl<'a> Reader<'a> {
         if read != announced {
             return Err(self.wrong(
                 self.at,
-                format!("{announced} elements are announced, but the blocks hold {read}"),
+                format!(
+                    "{announced} elements are announced, but the blocks hold {read}: save the mesh again"
+                ),
             ));
         }
         Ok(())
@@ -613,7 +642,10 @@ impl<'a> Reader<'a> {
             };
             let kind = self.known(place, number)?;
             if block < 1 || tags < 0 {
-                return Err(self.wrong(place, "the header of the elements is damaged"));
+                return Err(self.wrong(
+                    place,
+                    "the header of the elements is damaged: save the mesh again",
+                ));
             }
             for _ in 0..block {
                 let place = if self.binary { self.place() } else { place };
@@ -659,7 +691,7 @@ impl Raw {
         match sorted.windows(2).find(|w| w[0].0 == w[1].0) {
             Some(twice) => Err(reader.wrong(
                 self.point_places[twice[1].1 as usize],
-                format!("node {} is there twice", twice[1].0),
+                format!("node {} is there twice: remove one", twice[1].0),
             )),
             None => Ok(Lookup::Sorted(sorted)),
         }
@@ -695,7 +727,7 @@ impl Raw {
                     reader.wrong(
                         element.place,
                         format!(
-                            "element {} has the node {tag}, which is not there",
+                            "element {} has the node {tag}, which is not there: save the mesh with all of its nodes",
                             element.tag
                         ),
                     )

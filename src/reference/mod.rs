@@ -329,7 +329,7 @@ impl Reference {
             return Err((
                 format!(
                     "the surface of the body does not close: its areas and its volumes disagree by \
-                     {gap:.2e} of an area, at most {GAP:.0e} is round-off"
+                     {gap:.2e} of an area, at most {GAP:.0e} is round-off; mesh the body again"
                 ),
                 None,
             ));

@@ -859,6 +859,10 @@ pub(super) mod tests {
         let graph = Graph::new(&particles, scene.numerics.neighbours).expect("graph");
         let error = Reference::new(&particles, &graph, &scene.numerics).expect_err("open");
         println!("{error}");
-        assert!(error.to_string().contains("does not close"));
+        assert!(
+            error
+                .message()
+                .contains("the surface of the body does not close")
+        );
     }
 }

@@ -220,7 +220,7 @@ pub(super) fn initial(initial: &Initial) -> Result<()> {
         require(
             !function.depends_on_time(),
             path,
-            "an initial value cannot depend on t",
+            "an initial value cannot depend on t: use X, Y and Z only",
         )?;
     }
     for (name, field) in [
@@ -247,7 +247,7 @@ pub(super) fn initial(initial: &Initial) -> Result<()> {
                 require(
                     !component.depends_on_time(),
                     &format!("{path}[{c}]"),
-                    "an initial value cannot depend on t",
+                    "an initial value cannot depend on t: use X, Y and Z only",
                 )?;
             }
         }

@@ -389,7 +389,10 @@ impl MeshGeometry {
         if xxh3_64(&bytes) != self.content_hash() {
             return Err(Error::new(
                 Code::Io,
-                format!("the mesh {} has changed since it was read", self.file),
+                format!(
+                    "the mesh {} has changed since it was read: read the scene again",
+                    self.file
+                ),
             )
             .at_path("geometry.mesh.file"));
         }
@@ -758,7 +761,7 @@ fn perforated_box(b: &PerforatedBox) -> Result<()> {
         require(
             !b.solid[..i].contains(tile),
             &path,
-            "this tile is listed twice",
+            "this tile is listed twice: remove one",
         )?;
     }
     counted_grading(&at("grading"), b.grading.as_ref(), b.layers)
@@ -872,7 +875,7 @@ pub(super) fn selection(path: &str, patch: &PatchSelection, faces: &[String]) ->
         require(
             !patch.faces[..i].contains(face),
             &place,
-            &format!("the face `{face}` is listed twice"),
+            &format!("the face `{face}` is listed twice: remove one"),
         )?;
     }
     finite(&format!("{path}.min"), &patch.min.unwrap_or_default())?;

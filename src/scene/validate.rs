@@ -113,7 +113,11 @@ impl Scene {
                     (b.min[a] - slack..=b.max[a] + slack).contains(&point[a])
                 })
             });
-            require(inside, &path, "the probe lies outside the body")?;
+            require(
+                inside,
+                &path,
+                "the probe lies outside the body: give a point inside it, in the initial configuration",
+            )?;
         }
         Ok(())
     }
@@ -198,7 +202,7 @@ fn output(output: &Output) -> Result<()> {
         require(
             !output.fields.iter().flatten().take(i).any(|n| n == name),
             &place,
-            &format!("the field `{name}` is listed twice"),
+            &format!("the field `{name}` is listed twice: remove one"),
         )?;
     }
     Ok(())

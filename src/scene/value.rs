@@ -240,7 +240,10 @@ impl<const N: usize> Interpolation<N> {
         }
         for (i, t) in time.iter().enumerate() {
             if !t.is_finite() {
-                return error(&format!("table.time[{i}]"), "expected a finite time");
+                return error(
+                    &format!("table.time[{i}]"),
+                    &format!("expected a finite time instead of {t}"),
+                );
             }
             if i > 0 && *t <= time[i - 1] {
                 return error(
@@ -254,7 +257,10 @@ impl<const N: usize> Interpolation<N> {
         }
         for (i, v) in value.iter().enumerate() {
             if !v.iter().all(|v| v.is_finite()) {
-                return error(&format!("table.value[{i}]"), "expected finite numbers");
+                return error(
+                    &format!("table.value[{i}]"),
+                    &format!("expected finite numbers instead of {v:?}"),
+                );
             }
         }
         Ok(Self {
