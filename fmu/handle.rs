@@ -674,6 +674,8 @@ mod tests {
     fn a_missing_scene_is_named() {
         let error = read_scene(Some("/no/such/place")).unwrap_err();
         assert_eq!(error.code(), Code::Io);
+        let remedy = ": pass the path of the resources folder";
+        assert!(error.message().ends_with(remedy), "{error}");
         assert!(
             error.to_string().contains("/no/such/place/scene.json"),
             "{error}"

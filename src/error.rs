@@ -1,4 +1,5 @@
-//! Errors: a stable code, a message that a person can act on, and the place.
+//! Errors: a stable code, a message that a person can act on, and the place. `ERRORS.md` lists all of them
+//! with cause and remedy.
 
 use std::fmt;
 

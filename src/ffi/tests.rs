@@ -54,7 +54,8 @@ fn a_panic_poisons_its_handle_and_no_other() {
     let (code, text) = last_error(poisoned);
     assert_eq!(code, urlsph_status::URLSPH_INTERNAL);
     // The message, and where in our source.
-    assert!(text.contains("deliberately"), "{text}");
+    assert!(text.starts_with("internal error: deliberately"), "{text}");
+    assert!(text.contains("please report this bug"), "{text}");
     assert!(text.contains("tests.rs:"), "{text}");
 
     // Nothing but the error and the end is left.

@@ -439,12 +439,17 @@ fn read_file(path: &Path) -> Result<Vec<u8>> {
         };
         return Err(failed(&format_args!("it is {what}")));
     }
+    let too_large = || failed(&"it is larger than 4 GiB");
+    if about.len() > MOST {
+        return Err(too_large());
+    }
     let file = std::fs::File::open(path).map_err(|e| failed(&e))?;
+    // It may grow meanwhile.
     file.take(MOST + 1)
         .read_to_end(&mut bytes)
         .map_err(|e| failed(&e))?;
     if bytes.len() as u64 > MOST {
-        return Err(failed(&"it is larger than 4 GiB"));
+        return Err(too_large());
     }
     Ok(bytes)
 }
