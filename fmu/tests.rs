@@ -152,7 +152,7 @@ fn what_is_wrong_with_a_call_is_told_with_the_remedy() {
     is(
         stepping().step(0.1, 1e-3),
         A,
-        "but the last step ended at 0 s: continue there",
+        " s, but the last step ended at 0 s: continue there",
     );
     is(
         stepping().step(0.0, 1.0),

@@ -9,7 +9,7 @@ use crate::catalogue::Entry;
 const HEAD: &str = "# Errors
 
 What goes wrong, why, and what to do: every error of the library, its FMUs and the command line. This file is written
-by the tests from the catalogue in `tests/errors`, which bring each error about and read its text.
+by the tests from the catalogue in `tests/errors`, which bring each error about and read its text, but for the few that say so.
 
 Every error has a code (`urlsph_status` in C, `urlsph.Error` and its kinds in Python, `urlsph::Code` in Rust), a text,
 and, as far as they are known, the place: the JSON path in the scene, the boundary, the field, the particle, its
@@ -86,7 +86,7 @@ fn write(text: &mut String, entry: &Entry) {
     writeln!(text, "\n{}\n", code(&entry.text)).unwrap();
     if !entry.variants.is_empty() {
         let all: Vec<String> = entry.variants.iter().map(|v| code(v)).collect();
-        writeln!(text, "- Among others with {}", all.join(", ")).unwrap();
+        writeln!(text, "- Such as: {}", all.join(", ")).unwrap();
     }
     writeln!(text, "- Cause: {}", entry.cause).unwrap();
     writeln!(text, "- Remedy: {}", entry.remedy).unwrap();

@@ -10,6 +10,10 @@ const CYLINDER: &str = r#"geometry={"cylinder": {"radius": 1, "length": 2, "divi
 const PERFORATED: &str = r#"geometry={"perforated_box": {"min": [0, 0, 0], "max": [2, 1, 1], "tiles": [2, 1],
     "diameter": 0.5, "divisions": 2, "rings": 1, "layers": 2, "solid": []}}"#;
 
+/// Nodes of one cell at very different distances.
+const SPREAD: &str = r#"geometry={"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.5,
+    "jitter": {"fraction": 0.4}}}"#;
+
 pub fn entries() -> Vec<Entry> {
     [shapes(), patches(), particles(), sizes()]
         .into_iter()
@@ -351,9 +355,13 @@ fn particles() -> Vec<Entry> {
             "the neighbours of a particle lie in a plane or on a line, so no gradient can be formed: widen \
              numerics.neighbours",
         ])
-        .untested(
-            "The other corners of a cell do not lie in a plane with this one, and are its neighbours where the body \
-             hangs together: no body is known for which it appears.",
+        .scene(
+            &[SPREAD, r#"numerics={"operators": "kernel", "neighbours": {"radius": 1.1}}"#],
+            "numerics.neighbours",
+        )
+        .scene(
+            &[SPREAD, r#"numerics={"operators": "repaired", "neighbours": {"radius": 1.1}}"#],
+            "geometry",
         ),
         entry(
             S,
@@ -391,7 +399,14 @@ fn particles() -> Vec<Entry> {
             "The particle that is named has too few neighbours, or they are all on one side.",
             "Choose more neighbours, or the operators of the mesh.",
         )
-        .untested("No body is known for which it appears: random and jittered meshes are repaired (`tests/acceptance/irregular.rs`)."),
+        .scene(
+            &[
+                CYLINDER,
+                r#"geometry.cylinder.sector={"wedge": 0.1}"#,
+                "numerics.neighbours=6",
+            ],
+            "geometry",
+        ),
     ]
 }
 

@@ -1,6 +1,6 @@
 //! The catalogue of errors: every entry is brought about and read, every place in the source that makes an error
-//! has an entry, and `ERRORS.md` is what the catalogue says.
-#![cfg(feature = "cli")]
+//! has an entry, and `ERRORS.md` is what the catalogue says. Some cases need the devices and limits of Linux.
+#![cfg(all(feature = "cli", target_os = "linux"))]
 
 mod catalogue;
 #[path = "../common/mod.rs"]
