@@ -566,6 +566,10 @@ mod tests {
             let bad = State::from_bytes(&bad.to_bytes()).unwrap();
             let error = instance.restore(&bad).unwrap_err();
             assert_eq!(error.code(), Code::Snapshot);
+            assert_eq!(
+                error.message(),
+                "the FMU state has a number that is not finite: use one that this FMU has made"
+            );
         }
         instance.restore(&good).unwrap();
     }

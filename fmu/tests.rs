@@ -269,7 +269,7 @@ fn what_is_wrong_with_a_call_is_told_with_the_remedy() {
         );
         said(
             handle::set_logging(i, V3, "log", true, 1, null()),
-            "an array is NULL: pass one of the given length",
+            "an array is NULL, not aligned, or longer than memory can be: pass one of the given length",
         );
         let category = c"logColours".as_ptr();
         said(

@@ -234,8 +234,8 @@ fn instances() -> Vec<Entry> {
             "Get a state first.",
         ),
         f(
-            "an array is NULL: pass one of the given length",
-            "A list of references or values is missing, or not aligned.",
+            "an array is NULL, not aligned, or longer than memory can be: pass one of the given length",
+            "A list of references or values is missing, or its length is not that of any array.",
             "Pass arrays of the given length.",
         ),
         f(
@@ -302,6 +302,14 @@ fn instances() -> Vec<Entry> {
             "Use states of this FMU.",
         )
         .unit("fmu/tests.rs", CALLS),
+        entry(
+            N,
+            "",
+            "the FMU state has a number that is not finite: use one that this FMU has made",
+            "The bytes of the state were made or changed by others.",
+            "Use states of this FMU.",
+        )
+        .unit("fmu/instance.rs", "a_state_with_a_number_that_is_not_finite_is_refused"),
         entry(
             N,
             "",
