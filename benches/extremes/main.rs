@@ -20,7 +20,7 @@ use urlsph::scene::Precision;
 use urlsph::{Code, Control, Error, Field, Result, Scene, Simulation};
 
 use common::field;
-use monitor::{Findings, Monitor};
+use monitor::{Findings, Monitor, beyond};
 use sweeps::{Aim, SWEEPS, Series, Sweep};
 
 /// Sweeps from the ordinary to the absurd: what runs, what stops with an error, and what is wrong in silence.
@@ -347,7 +347,7 @@ fn scaled(
     let largest = base.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
     let difference = std::iter::zip(&own, &base).map(|(o, b)| (o / factor - b).abs() / largest);
     row.figure = cases::largest(difference);
-    if row.outcome == Outcome::Runs && !(row.figure < ROUND_OFF[usize::from(single)]) {
+    if row.outcome == Outcome::Runs && beyond(row.figure, ROUND_OFF[usize::from(single)]) {
         row.outcome = Outcome::Wrong;
         row.message = "differs from the same body in other units".to_owned();
     }

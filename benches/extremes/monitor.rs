@@ -124,25 +124,30 @@ impl Monitor {
     }
 }
 
+/// Whether a value is larger than its limit, or no number at all.
+pub fn beyond(value: f64, limit: f64) -> bool {
+    value.is_nan() || value > limit
+}
+
 impl Findings {
     /// Names of what was found to be wrong, in a run that is about noise or not, in single precision or not.
     pub fn wrong(&self, noise: bool, single: bool) -> Vec<&'static str> {
         let found = [
-            ("energy growth", !(self.growth <= GROWTH)),
-            ("error of the ledger", !noise && !(self.ledger <= LEDGER)),
+            ("energy growth", beyond(self.growth, GROWTH)),
+            ("error of the ledger", !noise && beyond(self.ledger, LEDGER)),
             (
                 "dissipation gives energy",
-                !(self.gain <= GAIN[usize::from(single)]),
+                beyond(self.gain, GAIN[usize::from(single)]),
             ),
-            ("entropy falls", !(self.loss <= LOSS)),
-            ("symmetry lost", !(self.asymmetry <= ASYMMETRY)),
+            ("entropy falls", beyond(self.loss, LOSS)),
+            ("symmetry lost", beyond(self.asymmetry, ASYMMETRY)),
             (
                 "checkerboard",
-                !noise && !(self.checkerboard <= CHECKERBOARD),
+                !noise && beyond(self.checkerboard, CHECKERBOARD),
             ),
             (
                 "volume ratio",
-                !(self.least_j > 0.0 && self.most_j.is_finite()),
+                self.least_j.is_nan() || self.least_j <= 0.0 || !self.most_j.is_finite(),
             ),
         ];
         found
