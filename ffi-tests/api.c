@@ -1088,13 +1088,19 @@ struct witness {
     pthread_t thread;
     int progress, asked, errors, infos, cancel_at;
     bool wrong_thread, wrong_order, not_busy;
-    double time, end;
+    double time, end, start;
+    /* The latest record, whose pointers are of the past, and the code of the latest error. */
+    urlsph_log_record last;
+    urlsph_status code;
 };
 
-static void on_log(urlsph_log_level level, const char *message, void *user_data) {
+static void on_log(const urlsph_log_record *record, void *user_data) {
     struct witness *w = user_data;
     if (!pthread_equal(pthread_self(), w->thread)) w->wrong_thread = true;
-    if (strlen(message) > 0) ++*(level == URLSPH_LOG_ERROR ? &w->errors : &w->infos);
+    const bool failed = record->level == URLSPH_LOG_ERROR;
+    if (strlen(record->message) > 0) ++*(failed ? &w->errors : &w->infos);
+    w->last = *record;
+    if (record->error) w->code = record->error->code;
 }
 
 static void on_progress(const urlsph_progress *p, void *user_data) {
@@ -1106,6 +1112,8 @@ static void on_progress(const urlsph_progress *p, void *user_data) {
     }
     w->time = p->time;
     w->end = p->end;
+    w->start = p->start;
+    if (p->reference_updates != 0) w->wrong_order = true;
     if (w->progress == 1 && !(all_give(w->s, URLSPH_BUSY) && urlsph_destroy(w->s) == URLSPH_BUSY)) {
         w->not_busy = true;
     }
@@ -1139,6 +1147,8 @@ static void callbacks(void) {
     CHECK(w.progress > 20 && w.asked == w.progress && w.time == end && w.end == end);
     CHECK(!w.wrong_thread && !w.wrong_order && !w.not_busy);
     CHECK(w.infos == 1 && w.errors == 0);
+    CHECK(w.last.level == URLSPH_LOG_INFO && w.last.event == URLSPH_EVENT_ADVANCED);
+    CHECK(w.last.error == NULL && w.last.time == end && w.last.steps == (uint64_t)w.progress);
 
     /* Watching changes nothing. */
     CHECK(urlsph_advance_to(quiet, end) == URLSPH_OK);
@@ -1147,7 +1157,9 @@ static void callbacks(void) {
     /* Cancelled after a step that stays; then on as if nothing had been, to the bit. */
     w.cancel_at = w.asked + 2;
     FAILS(urlsph_step(s, 100 * dt), URLSPH_CANCELLED);
-    CHECK(w.asked == w.cancel_at && w.errors == 1);
+    CHECK(w.asked == w.cancel_at && w.errors == 1 && w.start == end);
+    CHECK(w.last.event == URLSPH_EVENT_FAILED && w.last.error && w.code == URLSPH_CANCELLED);
+    CHECK(w.last.time == w.time && w.last.steps == (uint64_t)w.progress);
     double time;
     CHECK(urlsph_get_time(s, &time) == URLSPH_OK);
     CHECK(time == w.time && time > end && time < end + 3 * dt);

@@ -209,7 +209,12 @@ void callbacks() {
     const double dt = s.stable_step();
     int progress = 0, asked = 0, logged = 0, cancel_at = 0;
     urlsph::Callbacks c;
-    c.log = [&](urlsph_log_level, const char*) { ++logged; };
+    c.log = [&](const urlsph_log_record& record) {
+        const bool failed = record.event == URLSPH_EVENT_FAILED;
+        CHECK(failed == (record.error != nullptr) && failed == (record.level == URLSPH_LOG_ERROR));
+        CHECK(record.message[0] != 0 && record.steps > 0);
+        ++logged;
+    };
     c.progress = [&](const urlsph_progress& p) {
         ++progress;
         if (p.time > 1.0) throw std::runtime_error("stop here");

@@ -99,7 +99,7 @@ struct Options {
 /// the step and is thrown again by the call that made the step.
 struct Callbacks {
     /// Receives log messages.
-    std::function<void(urlsph_log_level, const char*)> log;
+    std::function<void(const urlsph_log_record&)> log;
     /// Is called after each time step.
     std::function<void(const urlsph_progress&)> progress;
     /// Is asked after each time step; true ends the call with URLSPH_CANCELLED.
@@ -369,8 +369,8 @@ private:
                 calls->thrown = std::current_exception();
             }
         }
-        static void log(urlsph_log_level level, const char* message, void* self) {
-            guard(self, [&](Callbacks& c) { c.log(level, message); });
+        static void log(const urlsph_log_record* record, void* self) {
+            guard(self, [&](Callbacks& c) { c.log(*record); });
         }
         static void progress(const urlsph_progress* p, void* self) {
             guard(self, [&](Callbacks& c) { c.progress(*p); });

@@ -90,6 +90,10 @@ pub struct Progress {
     pub dt: f64,
     /// Time steps since time 0.
     pub steps: u64,
+    /// Where this call began [s].
+    pub start: f64,
+    /// Updates of the reference configuration until now.
+    pub reference_updates: u64,
 }
 
 /// Motion of a probe, and its temperature.
@@ -394,6 +398,7 @@ impl Simulation {
         t_next: f64,
         observer: &mut dyn FnMut(&Progress) -> Control,
     ) -> Result<()> {
+        let start = self.time;
         while self.time < t_next {
             let (stable, remaining) = (self.stable_step(), t_next - self.time);
             // Round-off in t_next - t must not split a step of exactly this size.
@@ -416,6 +421,8 @@ impl Simulation {
                 end: t_next,
                 dt,
                 steps: self.steps,
+                start,
+                reference_updates: self.updates,
             };
             if observer(&progress) == Control::Cancel {
                 return Err(

@@ -28,9 +28,9 @@
 #define STEP 5e-3 /* s */
 #define STEPS 20
 
-static void on_log(urlsph_log_level level, const char *message, void *user_data) {
+static void on_log(const urlsph_log_record *record, void *user_data) {
     (void)user_data;
-    if (level == URLSPH_LOG_ERROR) fprintf(stderr, "log: %s\n", message);
+    if (record->level == URLSPH_LOG_ERROR) fprintf(stderr, "log: %s\n", record->message);
 }
 
 /* Prints why the last call on this simulation failed, and hands its status on. */

@@ -413,15 +413,22 @@ def test_divergence(column):
 def test_callbacks(column):
     seen, logged = [], []
     column.set_callbacks(
-        progress=seen.append, log=lambda level, text: logged.append((level, text))
+        progress=seen.append, log=logged.append
     )
     column.step(10.5 * column.stable_step)
     assert [p.steps for p in seen] == list(range(1, len(seen) + 1)) and len(seen) > 10
     assert seen[-1].time == seen[-1].end == column.time
-    assert logged[0][0] == "info"
+    assert {p.start for p in seen} == {0} and {p.reference_updates for p in seen} == {0}
+    (first,) = logged
+    assert (first.level, first.event, first.error) == ("info", "advanced", None)
+    assert (first.time, first.steps) == (column.time, column.steps)
+    assert first.message.endswith(f"in {column.steps} steps")
     with pytest.raises(urlsph.InvalidArgumentError):
         column.step(0.0)
-    assert logged[-1][0] == "error" and "dt" in logged[-1][1]
+    last = logged[-1]
+    assert (last.level, last.event) == ("error", "failed") and "dt" in last.message
+    assert isinstance(last.error, urlsph.InvalidArgumentError) and str(last.error) == last.message
+    assert (last.time, last.steps, last.error.time) == (column.time, column.steps, column.time)
 
     # The handle is in use while its callback runs.
     statuses = []

@@ -130,10 +130,11 @@ unsafe extern "C" fn cancel(host: *mut c_void) -> i32 {
     i32::from(host.patience.fetch_sub(1, Ordering::Relaxed) <= 0)
 }
 
-unsafe extern "C" fn log(_: urlsph_log_level, message: *const c_char, _: *mut c_void) {
-    // SAFETY: a NUL-terminated text for the time of the call.
-    let text = unsafe { CStr::from_ptr(message) };
+unsafe extern "C" fn log(record: *const urlsph_log_record, _: *mut c_void) {
+    // SAFETY: a record with a NUL-terminated text, and perhaps an error, for the time of the call.
+    let (text, error) = unsafe { (CStr::from_ptr((*record).message), (*record).error.as_ref()) };
     assert!(!text.is_empty());
+    assert!(error.is_none_or(|error| error.code != urlsph_status::URLSPH_OK));
 }
 
 /// A text without the NUL that ends it elsewhere.

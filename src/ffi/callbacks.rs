@@ -1,13 +1,16 @@
 //! The host's callbacks.
 
-use std::ffi::{CString, c_void};
+use std::ffi::{CStr, CString, c_void};
 use std::ptr;
 
 use super::types::{
-    urlsph_callbacks, urlsph_cancel_callback, urlsph_log_callback, urlsph_log_level,
-    urlsph_progress, urlsph_progress_callback,
+    urlsph_callbacks, urlsph_cancel_callback, urlsph_error, urlsph_log_callback, urlsph_log_event,
+    urlsph_log_level, urlsph_log_record, urlsph_progress, urlsph_progress_callback,
 };
-use crate::simulation::{Control, Progress};
+use crate::error::Error;
+use crate::simulation::{Control, Progress, Simulation};
+
+type LogFunction = unsafe extern "C" fn(*const urlsph_log_record, *mut c_void);
 
 /// Callbacks of one handle.
 #[derive(Clone, Copy)]
@@ -45,13 +48,50 @@ impl From<urlsph_callbacks> for Callbacks {
 }
 
 impl Callbacks {
-    /// Sends a message, which is only made if someone listens.
-    pub(super) fn log(&self, level: urlsph_log_level, message: impl FnOnce() -> String) {
-        let Some(log) = self.log else { return };
-        let message = c_text(&message());
-        // SAFETY: the host's function with the host's data, as the header describes; `message` is
-        // a C string that outlives the call.
-        unsafe { log(level, message.as_ptr(), self.user_data) }
+    /// Tells what was done, in a text that is only made if someone listens.
+    pub(super) fn inform(
+        &self,
+        event: urlsph_log_event,
+        simulation: &Simulation,
+        message: impl FnOnce() -> String,
+    ) {
+        if let Some(log) = self.log {
+            let level = urlsph_log_level::URLSPH_LOG_INFO;
+            let message = c_text(&message());
+            self.send(log, simulation, (level, event), &message, ptr::null());
+        }
+    }
+
+    /// Tells of a call that failed.
+    pub(super) fn complain(&self, error: &Error, simulation: &Simulation) {
+        if let Some(log) = self.log {
+            let level = urlsph_log_level::URLSPH_LOG_ERROR;
+            let event = urlsph_log_event::URLSPH_EVENT_FAILED;
+            let message = c_text(&error.to_string());
+            let error = urlsph_error::from(error);
+            self.send(log, simulation, (level, event), &message, &error);
+        }
+    }
+
+    fn send(
+        &self,
+        log: LogFunction,
+        simulation: &Simulation,
+        (level, event): (urlsph_log_level, urlsph_log_event),
+        message: &CStr,
+        error: *const urlsph_error,
+    ) {
+        let record = urlsph_log_record {
+            level,
+            event,
+            message: message.as_ptr(),
+            error,
+            time: simulation.time(),
+            steps: simulation.steps(),
+        };
+        // SAFETY: the host's function with the host's data, as the header describes; the record and
+        // what it points to outlive the call.
+        unsafe { log(&record, self.user_data) }
     }
 
     /// Whether someone wants to hear of each time step.
@@ -67,6 +107,8 @@ impl Callbacks {
                 end: p.end,
                 dt: p.dt,
                 steps: p.steps,
+                start: p.start,
+                reference_updates: p.reference_updates,
             };
             // SAFETY: the host's function with the host's data, as the header describes; `p`
             // outlives the call.

@@ -3,7 +3,7 @@
 use super::args::{array, buffer, check, put};
 use super::handle::{Session, with};
 use super::query::{patch_at, quantity_at};
-use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
+use super::types::{urlsph_log_event, urlsph_simulation, urlsph_status};
 use crate::boundary::Quantity;
 use crate::error::{Error, Result};
 use crate::simulation::Control;
@@ -257,7 +257,7 @@ fn advance(session: &mut Session, end: f64) -> Result<()> {
         simulation.advance_with(end, &mut |_| Control::Continue)?;
     }
     let made = simulation.steps() - before;
-    callbacks.log(urlsph_log_level::URLSPH_LOG_INFO, || {
+    callbacks.inform(urlsph_log_event::URLSPH_EVENT_ADVANCED, simulation, || {
         format!("advanced to {end:.6e} s in {made} steps")
     });
     Ok(())

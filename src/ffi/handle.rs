@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use super::callbacks::Callbacks;
 use super::panic;
-use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
+use super::types::{urlsph_simulation, urlsph_status};
 use crate::error::{Code, Error, Result};
 use crate::fields::FIELDS;
 use crate::simulation::Simulation;
@@ -117,8 +117,9 @@ impl Session {
 
     fn fail(&mut self, error: Error) -> urlsph_status {
         let status = error.code().into();
-        self.callbacks
-            .log(urlsph_log_level::URLSPH_LOG_ERROR, || error.to_string());
+        if let Some(simulation) = &self.simulation {
+            self.callbacks.complain(&error, simulation);
+        }
         self.error = Some(error);
         status
     }

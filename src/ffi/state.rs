@@ -4,7 +4,7 @@ use std::ffi::c_char;
 
 use super::args::{array, buffer, check, put, text};
 use super::handle::{Session, with};
-use super::types::{urlsph_log_level, urlsph_simulation, urlsph_status};
+use super::types::{urlsph_log_event, urlsph_simulation, urlsph_status};
 use crate::error::Result;
 use crate::snapshot::Snapshot;
 
@@ -74,14 +74,13 @@ pub unsafe extern "C" fn urlsph_restore_snapshot(
 }
 
 fn restore(session: &mut Session, snapshot: &Snapshot) -> Result<()> {
+    let callbacks = session.callbacks;
     let simulation = session.simulation_mut()?;
     simulation.restore(snapshot)?;
     let time = simulation.time();
-    session
-        .callbacks
-        .log(urlsph_log_level::URLSPH_LOG_INFO, || {
-            format!("returned to {time:.6e} s")
-        });
+    callbacks.inform(urlsph_log_event::URLSPH_EVENT_RESTORED, simulation, || {
+        format!("returned to {time:.6e} s")
+    });
     Ok(())
 }
 

@@ -69,10 +69,22 @@ impl From<Code> for urlsph_status {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
 pub enum urlsph_log_level {
-    /// A call failed; the text is that of its error.
+    /// A call failed.
     URLSPH_LOG_ERROR = 1,
     /// What was done.
     URLSPH_LOG_INFO = 3,
+}
+
+/// What a log message is about. Later versions may add events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum urlsph_log_event {
+    /// A call failed: `error` says why.
+    URLSPH_EVENT_FAILED = 1,
+    /// `urlsph_step` or `urlsph_advance_to` has reached its end.
+    URLSPH_EVENT_ADVANCED = 2,
+    /// A saved state has become the present one.
+    URLSPH_EVENT_RESTORED = 3,
 }
 
 /// What can be set from outside on a patch.
@@ -164,12 +176,33 @@ pub struct urlsph_progress {
     pub dt: f64,
     /// Time steps since time 0.
     pub steps: u64,
+    /// Where this call began [s].
+    pub start: f64,
+    /// Updates of the reference configuration until now.
+    pub reference_updates: u64,
 }
 
-/// Receives log messages; `message` is valid for the time of the call.
-pub type urlsph_log_callback = Option<
-    unsafe extern "C" fn(level: urlsph_log_level, message: *const c_char, user_data: *mut c_void),
->;
+/// A log message, as text and as data.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub struct urlsph_log_record {
+    /// How much it matters.
+    pub level: urlsph_log_level,
+    /// What it is about.
+    pub event: urlsph_log_event,
+    /// The message for people, NUL-terminated UTF-8.
+    pub message: *const c_char,
+    /// The error of a call that failed, otherwise NULL.
+    pub error: *const urlsph_error,
+    /// Simulated time now [s].
+    pub time: f64,
+    /// Time steps since time 0.
+    pub steps: u64,
+}
+
+/// Receives log messages; `record` and what it points to are valid for the time of the call.
+pub type urlsph_log_callback =
+    Option<unsafe extern "C" fn(record: *const urlsph_log_record, user_data: *mut c_void)>;
 
 /// Is called after each time step; `progress` is valid for the time of the call.
 pub type urlsph_progress_callback =

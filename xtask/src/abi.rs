@@ -437,7 +437,10 @@ mod tests {
                 "typedef int32_t urlsph_quantity",
                 "typedef int64_t urlsph_quantity",
             ),
-            ("(urlsph_log_level level,", "(int64_t level,"),
+            (
+                "(const struct urlsph_log_record *record,",
+                "(const struct urlsph_error *record,",
+            ),
             ("URLSPH_ERROR_TEXT_SIZE 2048", "URLSPH_ERROR_TEXT_SIZE 4096"),
             ("URLSPH_ABI_VERSION 0", "URLSPH_ABI_VERSION 1"),
         ] {

@@ -120,9 +120,13 @@ struct seen {
     double time, end;
 };
 
-static void on_log(urlsph_log_level level, const char *message, void *user_data) {
+static void on_log(const urlsph_log_record *record, void *user_data) {
     struct seen *seen = user_data;
-    if ((level == URLSPH_LOG_INFO || level == URLSPH_LOG_ERROR) && message[0]) ++seen->messages;
+    const int failed = record->event == URLSPH_EVENT_FAILED;
+    if (record->level == (failed ? URLSPH_LOG_ERROR : URLSPH_LOG_INFO) && record->message[0] &&
+        (record->error != NULL) == failed && (!failed || record->error->code != URLSPH_OK)) {
+        ++seen->messages;
+    }
 }
 
 static void on_progress(const urlsph_progress *progress, void *user_data) {

@@ -119,7 +119,7 @@ enum urlsph_log_level
   : int32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // A call failed; the text is that of its error.
+    // A call failed.
     URLSPH_LOG_ERROR = 1,
     // What was done.
     URLSPH_LOG_INFO = 3,
@@ -129,6 +129,27 @@ enum urlsph_log_level
 typedef enum urlsph_log_level urlsph_log_level;
 #else
 typedef int32_t urlsph_log_level;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What a log message is about. Later versions may add events.
+enum urlsph_log_event
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // A call failed: `error` says why.
+    URLSPH_EVENT_FAILED = 1,
+    // `urlsph_step` or `urlsph_advance_to` has reached its end.
+    URLSPH_EVENT_ADVANCED = 2,
+    // A saved state has become the present one.
+    URLSPH_EVENT_RESTORED = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum urlsph_log_event urlsph_log_event;
+#else
+typedef int32_t urlsph_log_event;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -223,8 +244,24 @@ typedef struct urlsph_error {
     char field[URLSPH_ERROR_FIELD_SIZE];
 } urlsph_error;
 
-// Receives log messages; `message` is valid for the time of the call.
-typedef void (*urlsph_log_callback)(urlsph_log_level level, const char *message, void *user_data);
+// A log message, as text and as data.
+typedef struct urlsph_log_record {
+    // How much it matters.
+    urlsph_log_level level;
+    // What it is about.
+    urlsph_log_event event;
+    // The message for people, NUL-terminated UTF-8.
+    const char *message;
+    // The error of a call that failed, otherwise NULL.
+    const struct urlsph_error *error;
+    // Simulated time now [s].
+    double time;
+    // Time steps since time 0.
+    uint64_t steps;
+} urlsph_log_record;
+
+// Receives log messages; `record` and what it points to are valid for the time of the call.
+typedef void (*urlsph_log_callback)(const struct urlsph_log_record *record, void *user_data);
 
 // Where a running `urlsph_step` or `urlsph_advance_to` is.
 typedef struct urlsph_progress {
@@ -236,6 +273,10 @@ typedef struct urlsph_progress {
     double dt;
     // Time steps since time 0.
     uint64_t steps;
+    // Where this call began [s].
+    double start;
+    // Updates of the reference configuration until now.
+    uint64_t reference_updates;
 } urlsph_progress;
 
 // Is called after each time step; `progress` is valid for the time of the call.

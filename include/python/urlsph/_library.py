@@ -71,10 +71,23 @@ class ProgressStruct(Structure):
         ("end", c_double),
         ("dt", c_double),
         ("steps", c_uint64),
+        ("start", c_double),
+        ("reference_updates", c_uint64),
     ]
 
 
-LogCallback = CFUNCTYPE(None, c_int32, c_char_p, c_void_p)
+class LogRecordStruct(Structure):
+    _fields_ = [
+        ("level", c_int32),
+        ("event", c_int32),
+        ("message", c_char_p),
+        ("error", POINTER(ErrorStruct)),
+        ("time", c_double),
+        ("steps", c_uint64),
+    ]
+
+
+LogCallback = CFUNCTYPE(None, POINTER(LogRecordStruct), c_void_p)
 ProgressCallback = CFUNCTYPE(None, POINTER(ProgressStruct), c_void_p)
 CancelCallback = CFUNCTYPE(c_int32, c_void_p)
 

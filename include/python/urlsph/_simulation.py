@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _library as c
-from ._errors import StaleViewError, Status
+from ._errors import Error, StaleViewError, Status
 from ._library import check, lib
 
 _QUANTITIES = {
@@ -30,6 +30,7 @@ _QUANTITIES = {
 _QUANTITY_NAMES = {number: name for name, number in _QUANTITIES.items()}
 _CONFIGURATIONS = {1: "initial", 2: "current", 3: "two_point"}
 _LOG_LEVELS = {1: "error", 3: "info"}
+_LOG_EVENTS = {1: "failed", 2: "advanced", 3: "restored"}
 
 Overrides = Union[Mapping[str, Any], Sequence[str]]
 
@@ -40,6 +41,19 @@ class Progress(NamedTuple):
     time: float  #: simulated time [s]
     end: float  #: where the call ends [s]
     dt: float  #: time step just made [s]
+    steps: int  #: time steps since time 0
+    start: float  #: where the call began [s]
+    reference_updates: int  #: updates of the reference configuration until now
+
+
+class LogRecord(NamedTuple):
+    """A log message, as text and as data."""
+
+    level: str  #: "error" or "info"; later versions may add levels
+    event: str  #: "failed", "advanced" or "restored"; later versions may add events
+    message: str  #: for people
+    error: Optional[Error]  #: of a call that failed
+    time: float  #: simulated time now [s]
     steps: int  #: time steps since time 0
 
 
@@ -225,7 +239,7 @@ class _Callbacks:
 
     def __init__(
         self,
-        log: Optional[Callable[[str, str], None]],
+        log: Optional[Callable[[LogRecord], None]],
         progress: Optional[Callable[[Progress], None]],
         cancel: Optional[Callable[[], bool]],
     ) -> None:
@@ -240,12 +254,22 @@ class _Callbacks:
                     self.raised = e
             return None
 
-        def on_log(level, message, _):
-            guard(lambda: log(_LOG_LEVELS.get(level, str(level)), message.decode()))
+        def on_log(record, _):
+            r = record.contents
+            read = LogRecord(
+                _LOG_LEVELS.get(r.level, str(r.level)),
+                _LOG_EVENTS.get(r.event, str(r.event)),
+                r.message.decode(),
+                r.error.contents.exception() if r.error else None,
+                r.time,
+                r.steps,
+            )
+            guard(lambda: log(read))
 
         def on_progress(p, _):
             p = p.contents
-            guard(lambda: progress(Progress(p.time, p.end, p.dt, p.steps)))
+            fields = (p.time, p.end, p.dt, p.steps, p.start, p.reference_updates)
+            guard(lambda: progress(Progress(*fields)))
 
         def on_cancel(_):
             stop = guard(cancel) if cancel else False
@@ -431,13 +455,13 @@ class Simulation:
     def set_callbacks(
         self,
         *,
-        log: Optional[Callable[[str, str], None]] = None,
+        log: Optional[Callable[[LogRecord], None]] = None,
         progress: Optional[Callable[[Progress], None]] = None,
         cancel: Optional[Callable[[], bool]] = None,
     ) -> None:
         """Sets what the simulation calls, on the thread that calls the simulation.
 
-        :param log: receives level ("error", "info") and text of log messages.
+        :param log: receives each log message as a :class:`LogRecord`.
         :param progress: is called after each time step.
         :param cancel: is asked after each time step; a true answer ends the call with
             :class:`CancelledError`.

@@ -15,6 +15,9 @@ use crate::SceneArguments;
 use crate::accuracy::{self, Accuracy};
 use crate::check::grouped;
 
+/// Share of the largest energy from which a closure error asks for a look.
+const LARGE_CLOSURE_ERROR: f64 = 0.01;
+
 #[derive(Args)]
 pub struct Run {
     #[command(flatten)]
@@ -245,7 +248,6 @@ pub fn summary(
             line(name, format!("{value:>14.6e} J"));
         }
     }
-    // A body at rest without loads has no energy to compare with.
     let scale = [
         stored(&initial),
         energies.external_work,
@@ -256,18 +258,16 @@ pub fn summary(
     .map(f64::abs)
     .into_iter()
     .fold(0.0, f64::max);
-    let share = if scale > 0.0 {
-        format!(
-            " ({:.1e} of the largest energy)",
-            energies.closure_error.abs() / scale
-        )
-    } else {
-        String::new()
-    };
-    line(
-        "closure error",
-        format!("{:>14.6e} J{share}", energies.closure_error),
-    );
+    // A body at rest without loads has no energy to compare with.
+    let share = (scale > 0.0).then(|| energies.closure_error.abs() / scale);
+    let of = share.map_or_else(String::new, |s| format!(" ({s:.1e} of the largest energy)"));
+    let error = format!("{:>14.6e} J{of}", energies.closure_error);
+    line("closure error", error);
+    if share.is_some_and(|share| share > LARGE_CLOSURE_ERROR) {
+        let advice =
+            "the closure error is large: compare with a smaller numerics.cfl and a finer spacing";
+        line("warning", advice.to_owned());
+    }
     line("results", recorder.folder().display().to_string());
     text
 }
