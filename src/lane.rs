@@ -620,6 +620,15 @@ impl PerSlot {
             |least, value| if value < least { value } else { least },
         );
     }
+    /// Takes the maximum with the value for the slots from `at`; a value that is NaN is ignored.
+    #[inline(always)]
+    pub fn max<T: Lane>(&mut self, at: usize, value: T) {
+        self.update(
+            at,
+            value,
+            |most, value| if value > most { value } else { most },
+        );
+    }
     #[inline(always)]
     fn update<T: Lane>(&mut self, at: usize, value: T, each: impl Fn(f64, f64) -> f64) {
         let at = at % T::Real::SLICE;
@@ -629,6 +638,10 @@ impl PerSlot {
     /// Sum over the slice.
     pub fn sum(&self) -> f64 {
         self.0.iter().sum()
+    }
+    /// Maximum over the slice.
+    pub fn most(&self) -> f64 {
+        self.0.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
     /// Minimum over the slice.
     pub fn least(&self) -> f64 {

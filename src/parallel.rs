@@ -3,7 +3,7 @@
 //! Slabs depend on the number of particles alone, so that every sum has the same order, and the
 //! results the same bits, whatever the number of threads.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 
 use rayon::prelude::*;
@@ -27,6 +27,7 @@ impl Pool {
     /// A pool of `threads` threads; 0 means as many as the machine has cores.
     pub fn new(threads: usize) -> Result<Self> {
         const MOST: usize = 1024;
+        const DIED: &str = "a thread died at its start";
         if threads > MOST {
             return Err(Error::argument(format!(
                 "{threads} threads asked for, at most {MOST} are possible: give 0 for one per core"
@@ -36,6 +37,7 @@ impl Pool {
             pool: None,
             threads: Vec::new(),
         };
+        let (alive, alive_all) = mpsc::channel();
         // Not from the caller's thread, so that a host can unload the library.
         let pool = aside(|| {
             rayon::ThreadPoolBuilder::new()
@@ -43,17 +45,23 @@ impl Pool {
                 .spawn_handler(|thread| {
                     let name = format!("{THREAD_NAME_PREFIX}{}", thread.index());
                     let builder = thread::Builder::new().name(name);
-                    this.threads.push(builder.spawn(|| thread.run())?);
+                    let alive = alive.clone();
+                    this.threads.push(builder.spawn(move || {
+                        // Nobody waits any more if another thread did not start.
+                        let _ = alive.send(());
+                        drop(alive);
+                        thread.run();
+                    })?);
                     Ok(())
                 })
                 .build()
         })
-        .map_err(|e| {
-            Error::new(
-                Code::OutOfMemory,
-                format!("the thread pool did not start: {e}; ask for fewer threads"),
-            )
-        })?;
+        .map_err(not_started)?;
+        // Where memory ends, a thread can start and die before it takes any work, which would wait for it for ever.
+        drop(alive);
+        for _ in &this.threads {
+            alive_all.recv().map_err(|_| not_started(DIED))?;
+        }
         this.pool = Some(pool);
         Ok(this)
     }
@@ -79,6 +87,13 @@ impl Pool {
         }
         aside(|| pool.install(work))
     }
+}
+
+fn not_started(reason: impl std::fmt::Display) -> Error {
+    Error::new(
+        Code::OutOfMemory,
+        format!("the thread pool did not start: {reason}; ask for fewer threads"),
+    )
 }
 
 impl Drop for Pool {

@@ -327,13 +327,15 @@ impl Simulation {
     }
 
     /// Largest stable step from the present state [s]: the scene's fixed step, or
-    /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63), and no more than explicit conduction and
-    /// convection bear.
+    /// alpha min |x_ab| lambda_ab / c_p ([URL22] 62, 63), and no more than `numerics.strain_increment` and
+    /// explicit conduction and convection bear.
     pub fn stable_step(&self) -> f64 {
         if let Some(step) = self.scene.numerics.time_step {
             return step;
         }
-        let linear = self.cfl_number() * self.evaluation.length / self.url.wave_speeds().pressure;
+        let linear = self
+            .wave_step(self.evaluation.length)
+            .min(self.strain_step());
         let Some(thermal) = self.url.thermal() else {
             return linear;
         };
@@ -342,6 +344,16 @@ impl Simulation {
         let decay =
             1.0 / self.evaluation.conduction_step + convection / (CONVECTION_STEPS * thermal.c_v);
         linear.min(1.0 / decay)
+    }
+
+    /// Step that waves allow particles at an effective distance [s].
+    fn wave_step(&self, length: f64) -> f64 {
+        self.cfl_number() * length / self.url.wave_speeds().pressure
+    }
+
+    /// Step that strains and turns no particle by more than the scene allows [s].
+    fn strain_step(&self) -> f64 {
+        self.scene.numerics.strain_increment() / self.evaluation.rate
     }
 
     /// The CFL number alpha of the scene, or the default for its neighbours and its Poisson ratio.
@@ -410,7 +422,9 @@ impl Simulation {
                 stable.min(0.5 * remaining)
             };
             let time = if last { t_next } else { self.time + dt };
-            let share = self.evaluation.length / self.first_length;
+            let first = self.wave_step(self.first_length);
+            let bound = self.wave_step(self.evaluation.length);
+            let share = bound.min(self.strain_step()) / first;
             let fixed = self.scene.numerics.time_step.is_some();
             if time <= self.time || (!fixed && share < self.scene.numerics.smallest_step()) {
                 return Err(self.collapsed(stable, share));
@@ -443,8 +457,19 @@ impl Simulation {
         let (state, reference) = (&self.state, &self.reference);
         let caller = |slot: usize| self.order[slot - Layout::FIRST];
         let narrow = self.url.narrowest(state, reference);
-        let slot = narrow.slot;
+        let flow = self.strain_step() < self.wave_step(self.evaluation.length);
+        let slot = if flow {
+            self.url.fastest(state, reference)
+        } else {
+            narrow.slot
+        };
         let what = match narrow.pair {
+            _ if flow => format!(
+                "the velocity gradient has grown to {:.1e} 1/s, and a step strains no particle by more than \
+                 numerics.strain_increment, {}: refine the spacing or reduce the load",
+                self.evaluation.rate,
+                self.scene.numerics.strain_increment(),
+            ),
             Some((other, closer, deformed)) if closer < 0.5 * deformed => format!(
                 "particles {} and {} have come together to {closer:.1e} of their first distance \
                  while the deformation around them gives {deformed:.1e}, so that they are on the way \

@@ -91,6 +91,67 @@ fn the_default_step_follows_the_neighbours_that_there_are() {
     assert_eq!((six.cfl_number(), block(&[]).cfl_number()), (0.45, 0.9));
 }
 
+/// A step strains and turns no particle by more than the scene allows.
+#[test]
+fn violent_flow_shortens_the_step() {
+    let rates = [
+        (r#"["1000*X", 0, 0]"#, 1000.0),
+        // Twice as thick: the same jumps over twice the distance.
+        (r#"["1000*X", 0, 0]"#, 500.0),
+        (r#"["-1000*Y", "1000*X", 0]"#, 1000.0 * 2.0_f64.sqrt()),
+    ];
+    for (k, (velocity, rate)) in rates.into_iter().enumerate() {
+        let stretch = f64::from(k == 1);
+        let start = |own: &str| {
+            block(&[
+                &format!("initial.velocity={velocity}"),
+                &format!(r#"initial.displacement=["{stretch}*X", 0, 0]"#),
+                own,
+            ])
+        };
+        for (own, increment) in [
+            ("title=none", 0.1),
+            ("numerics.strain_increment=0.02", 0.02),
+        ] {
+            let residual = start(own).stable_step() * rate / increment - 1.0;
+            println!("{velocity}: residual {residual:.1e}, tolerance 1e-12");
+            assert!(residual.abs() < 1e-12);
+        }
+        let (calm, free) = (block(&[]), start("numerics.strain_increment=0"));
+        assert!(free.stable_step() > 0.5 * calm.stable_step());
+    }
+}
+
+/// Behind an impact at twice the speed of shear waves and more the CFL condition alone allows a step that
+/// turns particles inside out.
+#[test]
+fn impacts_beyond_the_speed_of_sound_run() {
+    for speed in [150, 300] {
+        let cube = |own: &str| {
+            block(&[
+                r#"geometry={"box": {"min": [0, 0, 0], "max": [1, 1, 1], "spacing": 0.125}}"#,
+                r#"material={"neo_hookean": {"density": 1100, "youngs_modulus": 1.7e7, "poisson_ratio": 0.3}}"#,
+                r#"contact={"wall": {"point": [0, 0, 0], "normal": [0, 0, 1]}}"#,
+                &format!("initial.velocity=[0, 0, -{speed}]"),
+                own,
+            ])
+        };
+        let mut free = cube("numerics.strain_increment=0");
+        let error = free.advance(0.02).expect_err("inside out");
+        assert_eq!(
+            (error.code(), free.time()),
+            (Code::Diverged, 0.0),
+            "{error}"
+        );
+        let mut bounded = cube("title=the default");
+        let e0 = bounded.energies().kinetic;
+        bounded.advance(0.02).expect("it runs");
+        let closure = bounded.energies().closure_error / e0;
+        println!("{speed} m/s: error of the ledger {closure:.1e} of the energy, tolerance 2e-3");
+        assert!(closure.abs() < 2e-3);
+    }
+}
+
 /// A prescribed velocity needs a value at its own time only.
 #[test]
 fn prescribed_velocities_with_singular_ends() {

@@ -396,7 +396,7 @@ fn everything() -> Value {
             "neighbours": {"radius": 1.8}, "operators": "kernel", "weights": "tributary", "smoothing_factor": 0.7, "kernel_option": 2,
             "reference_update": {"every": 10}, "state": "fhj", "reconstruction": "linear", "limiter": "minmod",
             "dissipation": true, "dissipation_coefficient": 0.5, "volume_dissipation": 0.1, "angular_momentum_projection": true, "cfl": 0.3,
-            "smallest_step": 0.01, "precision": "single"
+            "strain_increment": 0.2, "smallest_step": 0.01, "precision": "single"
         },
         "probes": {"corner": [0, 3, 0], "inner-1": [0.3, 0.4, 0.5]},
         "time": {"end": 0.5},
@@ -685,7 +685,9 @@ fn bad_values_are_refused_with_their_place() {
         ("numerics.time_step=0", S, "numerics.time_step", &["above 0"]),
         ("numerics.smallest_step=-0.1", S, "numerics.smallest_step", &["0 or more"]),
         ("numerics.smallest_step=1", S, "numerics.smallest_step", &["less than 1"]),
+        ("numerics.strain_increment=-0.1", S, "numerics.strain_increment", &["0 or more"]),
         ("numerics={\"time_step\": 1e-5, \"cfl\": 0.5}", S, "numerics.time_step", &["not both"]),
+        ("numerics={\"time_step\": 1e-5, \"strain_increment\": 0.5}", S, "numerics.time_step", &["not both"]),
         // Time, probes, output.
         ("time.end=0", S, "time.end", &["above 0"]),
         ("probes.p=[0, 6.01, 0]", S, "probes.p", &["outside the body"]),

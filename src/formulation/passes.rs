@@ -179,6 +179,8 @@ pub(super) struct Motion {
     pub kinetic: f64,
     /// Smallest square of a length that bounds the step [m^2].
     pub length2: f64,
+    /// Largest square of a norm of the spatial velocity gradient [1/s^2].
+    pub rate2: f64,
 }
 
 impl<E: Real> Work for Points<'_, '_, '_, E> {
@@ -201,6 +203,7 @@ impl<E: Real> Work for Points<'_, '_, '_, E> {
         let half = T::splat(token, 0.5);
         let mut kinetic = PerSlot::new(0.0);
         let mut shortest = PerSlot::new(f64::INFINITY);
+        let mut fastest = PerSlot::new(0.0);
         let mut admissible = PerSlot::new(1.0);
         let (one, zero) = (T::splat(token, 1.0), T::splat(token, 0.0));
         let infinity = T::splat(token, f64::INFINITY);
@@ -210,10 +213,11 @@ impl<E: Real> Work for Points<'_, '_, '_, E> {
             // 1/2 grad_chi v f^-1, f^-1 from f itself.
             let f = load9::<T>(token, &kinematics.f, a);
             let cof_f = cofactor(&f);
-            if let Some(half_grad) = &mut block.half_grad {
-                let factor = half / dot(f[0], cof_f[0]);
-                let grad = load_slab9::<T>(token, &kept.grad_v, at);
-                store9(&scale9(factor, &mat_mul_t(&grad, &cof_f)), half_grad, at);
+            let grad = load_slab9::<T>(token, &kept.grad_v, at);
+            let half_grad = scale9(half / dot(f[0], cof_f[0]), &mat_mul_t(&grad, &cof_f));
+            fastest.max(at, double_dot(&half_grad, &half_grad));
+            if let Some(out) = &mut block.half_grad {
+                store9(&half_grad, out, at);
             }
 
             // Q = V_R P F_chi^T L and S = V_chi h L.
@@ -254,6 +258,7 @@ impl<E: Real> Work for Points<'_, '_, '_, E> {
         Ok(Motion {
             kinetic: kinetic.sum(),
             length2: shortest.least(),
+            rate2: 4.0 * fastest.most(),
         })
     }
 }

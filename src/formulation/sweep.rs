@@ -365,7 +365,11 @@ impl<E: PairReal> Passes<'_, E> {
         let stored = with_law!(task.law, law => {
             stresses::<R, _, E>(law, task.inputs, task.flow, run, &mut out)
         })?;
-        let Motion { kinetic, length2 } = R::run(Points {
+        let Motion {
+            kinetic,
+            length2,
+            rate2,
+        } = R::run(Points {
             density: task.law.density(),
             kinematics: task.inputs.kinematics,
             reference,
@@ -391,6 +395,7 @@ impl<E: PairReal> Passes<'_, E> {
             entropy: stored.entropy,
             kinetic,
             length: length2,
+            rate: rate2,
             ..Evaluation::NONE
         })
     }
@@ -608,7 +613,7 @@ impl<E: PairReal> Sweep<E> {
         self.layout.slots.div_ceil(self.ends.each)
     }
 
-    /// All passes over the body; the length is still squared.
+    /// All passes over the body; length and rate are still squared.
     pub fn run<R: Runner>(
         &mut self,
         task: Task,

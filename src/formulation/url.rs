@@ -85,6 +85,8 @@ pub struct Evaluation {
     pub dissipation: f64,
     /// Smallest |x_ab| lambda_ab over all pairs [m]: the stable step times the linear wave speed.
     pub length: f64,
+    /// Largest norm of a particle's spatial velocity gradient, |grad_x v| [1/s].
+    pub rate: f64,
     /// Longest time for which explicit conduction is stable [s].
     pub conduction_step: f64,
 }
@@ -99,6 +101,7 @@ impl Evaluation {
         conduction: 0.0,
         dissipation: 0.0,
         length: f64::INFINITY,
+        rate: 0.0,
         conduction_step: f64::INFINITY,
     };
 
@@ -111,6 +114,7 @@ impl Evaluation {
         self.conduction += other.conduction;
         self.dissipation += other.dissipation;
         self.length = self.length.min(other.length);
+        self.rate = self.rate.max(other.rate);
         self.conduction_step = self.conduction_step.min(other.conduction_step);
     }
 
@@ -417,6 +421,7 @@ impl Url {
             total.length = total.length.min(self.area_length2::<R>(state, reference));
         }
         total.length = total.length.sqrt();
+        total.rate = total.rate.sqrt();
         // The linear reconstruction of a pair may pass the jump, and such a pair gains a little of what
         // the others lose. Where all of them together gain, flow varies beyond what gradients
         // can follow: then nothing is left to those that gain.
@@ -476,7 +481,7 @@ impl Url {
         }
     }
 
-    /// Gradient, law, point and force passes; the length is still squared.
+    /// Gradient, law, point and force passes; length and rate are still squared.
     fn sweep<R: Runner>(
         &mut self,
         state: &State,
@@ -721,6 +726,24 @@ impl Url {
             *j = Array::new(layout, [1.0]);
         }
         Ok(())
+    }
+
+    /// Slot of the particle with the largest velocity gradient of the last evaluation.
+    #[cold]
+    pub fn fastest(&self, state: &State, reference: &Reference) -> usize {
+        let rate2 = |slot: &usize| {
+            let f = matrix(&state.f.get(*slot));
+            let cof = cofactor(&f);
+            let rate = scale9(
+                1.0 / dot(f[0], cof[0]),
+                &mat_mul_t(&self.grad_v(*slot), &cof),
+            );
+            double_dot(&rate, &rate)
+        };
+        (0..reference.layout.particles)
+            .map(Layout::slot)
+            .max_by(|a, b| rate2(a).total_cmp(&rate2(b)))
+            .unwrap_or(Layout::FIRST)
     }
 
     /// What bounds the step of the last evaluation.

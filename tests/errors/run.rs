@@ -82,8 +82,8 @@ fn steps() -> Vec<Entry> {
             Diverged,
             "particle position time",
             "the stable step fell to <step> s, <share> of the first one, and numerics.smallest_step is <share>: <reason>",
-            "At the particle, the place and the time that are named the body is pressed together so far that no step \
-             of reasonable size is stable.",
+            "At the particle, the place and the time that are named the body is pressed together so far, or flows so \
+             fast, that no step of reasonable size is stable.",
             "Refine the spacing or reduce the load; the message names more. `numerics.smallest_step` set to 0 lifts the limit.",
         )
         .variants(&[
@@ -93,7 +93,12 @@ fn steps() -> Vec<Entry> {
              deformation around them gives <share>, so that they are on the way past each other: raise \
              numerics.dissipation_coefficient if it is below 1, refine the spacing, leave out numerics.volume_dissipation, \
              try numerics.operators \"repaired\" or 6 neighbours under high pressure, or reduce the load",
+            "the velocity gradient has grown to <rate> 1/s, and a step strains no particle by more than \
+             numerics.strain_increment, <share>: refine the spacing or reduce the load",
         ])
+        .call("an explosion", || {
+            block(&[r#"initial.velocity=["1e6*X", 0, 0]"#]).advance(1.0)
+        })
         .call("a piston", || {
             block(&[
                 "numerics.smallest_step=0.5",

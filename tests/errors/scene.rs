@@ -254,6 +254,25 @@ fn numerics() -> Vec<Entry> {
         entry(
             S,
             "path",
+            "expected 0 or more instead of <value>; 0 sets no limit",
+            "It is what a step may strain a particle by.",
+            "Leave it out (0.1), or give 0 for no limit.",
+        )
+        .scene(&["numerics.strain_increment=-1"], "numerics.strain_increment"),
+        entry(
+            S,
+            "path",
+            "a fixed step knows no limits; give `time_step` or `strain_increment`, not both",
+            "The scene has a fixed step and a limit for it.",
+            "Decide for one of the two.",
+        )
+        .scene(
+            &[r#"numerics={"time_step": 1e-5, "strain_increment": 0.5}"#],
+            "numerics.time_step",
+        ),
+        entry(
+            S,
+            "path",
             "a limiter needs `reconstruction` to be `linear`",
             "A reconstruction that is constant has nothing to be limited.",
             "Leave `limiter` out, or set `reconstruction` to `linear`.",
