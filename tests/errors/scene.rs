@@ -256,7 +256,7 @@ fn numerics() -> Vec<Entry> {
             "path",
             "expected 0 or more instead of <value>; 0 sets no limit",
             "It is what a step may strain a particle by.",
-            "Leave it out (0.1), or give 0 for no limit.",
+            "Leave it out (0.25), or give 0 for no limit.",
         )
         .scene(&["numerics.strain_increment=-1"], "numerics.strain_increment"),
         entry(
