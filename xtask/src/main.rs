@@ -14,6 +14,7 @@ mod install;
 mod output_tests;
 mod peer;
 mod project;
+mod semver;
 mod tally;
 mod test;
 mod tools;
@@ -50,6 +51,8 @@ Tasks:
               files
   peer        Time and errors beside LAMMPS' Smooth Mach Dynamics, one core each; the report is
               target/peer/report.md. Options: benches/peer/README.md
+  semver      [REVISION]: the Rust interface against that of the last release, or of a revision, by
+              cargo-semver-checks
   test        All checks and tests: format, lints, docs, Rust, C, C++, Python, FMI, a short fuzzing
   validate    The long comparisons with reference solutions, with residuals and tolerances, the extremes, and an
               FMU loaded 2,000 times and called a million times
@@ -85,6 +88,8 @@ fn run(arguments: &[String]) -> Result<()> {
         ["header", "--check"] => header::header(&sh, true),
         ["install", arguments @ ..] => install::install(&sh, arguments),
         ["peer", arguments @ ..] => peer::peer(&sh, arguments),
+        ["semver"] => semver::semver(&sh, None),
+        ["semver", revision] => semver::semver(&sh, Some(revision)),
         ["test"] => test::test(&sh),
         ["wheel"] => wheel::wheel(&sh).map(drop),
         ["validate"] => validate::validate(&sh),
