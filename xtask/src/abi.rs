@@ -54,7 +54,7 @@ pub fn abi_tests(sh: &Shell) -> Result<Tally> {
     Ok(tally)
 }
 
-/// `cargo xtask abi --freeze`: keeps header and symbols of the present version.
+/// `cargo xtask abi --freeze`: keeps header, symbols, variables of FMUs and keys of scenes of the present version.
 pub fn freeze(sh: &Shell) -> Result<()> {
     abi(sh)?;
     let folder = Path::new(RELEASES).join(env!("CARGO_PKG_VERSION"));
@@ -67,6 +67,15 @@ pub fn freeze(sh: &Shell) -> Result<()> {
     sh.create_dir(&folder)?;
     sh.copy_file(HEADER, folder.join("urlsph.h"))?;
     sh.write_file(folder.join("symbols.txt"), symbols)?;
+    if !folder.join("scene.json").exists() {
+        bail!(
+            "write program.c and scene.json of {} and freeze again",
+            folder.display()
+        );
+    }
+    cmd!(sh, "cargo test --quiet --all-features --test frozen")
+        .env("URLSPH_FREEZE", "1")
+        .run()?;
     println!("{} is frozen", folder.display());
     Ok(())
 }
