@@ -192,8 +192,9 @@ void snapshots() {
         [&] { s.restore(std::vector<std::uint8_t>(saved.begin(), saved.end() - 1)); });
     CHECK(e.code() == URLSPH_SNAPSHOT && s.state_hash() == there);
 
-    const std::string path = (std::filesystem::temp_directory_path() /
-                              ("urlsph-" + std::to_string(there) + ".snapshot")).string();
+    std::string folder = (std::filesystem::temp_directory_path() / "urlsph-XXXXXX").string();
+    CHECK(mkdtemp(folder.data()));
+    const std::string path = folder + "/s.snapshot";
     s.save_snapshot(path);
     s.restore(saved);
     s.restore_snapshot(path);
@@ -202,6 +203,7 @@ void snapshots() {
     CHECK(thrown([&] { s.restore_snapshot(path); }).code() == URLSPH_IO);
     CHECK(thrown([&] { s.save_snapshot(path + "/in/it"); }).code() == URLSPH_IO);
     CHECK(s.state_hash() == there);
+    CHECK(std::filesystem::remove(folder));
 }
 
 void callbacks() {

@@ -37,10 +37,10 @@ impl Pool {
             pool: None,
             threads: Vec::new(),
         };
-        let (alive, alive_all) = mpsc::channel();
         // Not from the caller's thread, so that a host can unload the library.
-        let pool = aside(|| {
-            rayon::ThreadPoolBuilder::new()
+        this.pool = Some(aside(|| {
+            let (alive, all_alive) = mpsc::channel();
+            let pool = rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
                 .spawn_handler(|thread| {
                     let name = format!("{THREAD_NAME_PREFIX}{}", thread.index());
@@ -55,14 +55,14 @@ impl Pool {
                     Ok(())
                 })
                 .build()
-        })
-        .map_err(not_started)?;
-        // Where memory ends, a thread can start and die before it takes any work, which would wait for it for ever.
-        drop(alive);
-        for _ in &this.threads {
-            alive_all.recv().map_err(|_| not_started(DIED))?;
-        }
-        this.pool = Some(pool);
+                .map_err(not_started)?;
+            // Where memory ends, a thread can start and die before it takes any work, which would wait for it for ever.
+            drop(alive);
+            for _ in &this.threads {
+                all_alive.recv().map_err(|_| not_started(DIED))?;
+            }
+            Ok(pool)
+        })?);
         Ok(this)
     }
 

@@ -56,8 +56,8 @@ pub struct Simulation {
     resultants: Resultants,
     generation: u64,
     updates: u64,
-    /// Length that bounds the step at time 0 [m].
-    first_length: f64,
+    /// Step that waves and strains allow at time 0 [s].
+    first_step: f64,
 }
 
 /// Largest decay rate times step of convection; the three stages are stable up to 2.51.
@@ -186,7 +186,7 @@ impl Simulation {
             resultants: Resultants::default(),
             generation: 0,
             updates: 0,
-            first_length: 0.0,
+            first_step: 0.0,
             scene,
         };
         let supplied = this.first_impulse()?;
@@ -218,7 +218,7 @@ impl Simulation {
         {
             this.reference.forget_double();
         }
-        this.first_length = this.evaluation.length;
+        this.first_step = this.wave_step().min(this.strain_step());
         let e = &this.evaluation;
         this.accounts.initial = e.kinetic + e.strain + e.thermal - supplied;
         this.resultants = this.compute_resultants()?;
@@ -333,9 +333,7 @@ impl Simulation {
         if let Some(step) = self.scene.numerics.time_step {
             return step;
         }
-        let linear = self
-            .wave_step(self.evaluation.length)
-            .min(self.strain_step());
+        let linear = self.wave_step().min(self.strain_step());
         let Some(thermal) = self.url.thermal() else {
             return linear;
         };
@@ -346,9 +344,9 @@ impl Simulation {
         linear.min(1.0 / decay)
     }
 
-    /// Step that waves allow particles at an effective distance [s].
-    fn wave_step(&self, length: f64) -> f64 {
-        self.cfl_number() * length / self.url.wave_speeds().pressure
+    /// Step that waves allow [s].
+    fn wave_step(&self) -> f64 {
+        self.cfl_number() * self.evaluation.length / self.url.wave_speeds().pressure
     }
 
     /// Step that strains and turns no particle by more than the scene allows [s].
@@ -422,9 +420,7 @@ impl Simulation {
                 stable.min(0.5 * remaining)
             };
             let time = if last { t_next } else { self.time + dt };
-            let first = self.wave_step(self.first_length);
-            let bound = self.wave_step(self.evaluation.length);
-            let share = bound.min(self.strain_step()) / first;
+            let share = self.wave_step().min(self.strain_step()) / self.first_step;
             let fixed = self.scene.numerics.time_step.is_some();
             if time <= self.time || (!fixed && share < self.scene.numerics.smallest_step()) {
                 return Err(self.collapsed(stable, share));
@@ -456,8 +452,8 @@ impl Simulation {
     fn collapsed(&self, stable: f64, share: f64) -> Error {
         let (state, reference) = (&self.state, &self.reference);
         let caller = |slot: usize| self.order[slot - Layout::FIRST];
-        let narrow = self.url.narrowest(state, reference);
-        let flow = self.strain_step() < self.wave_step(self.evaluation.length);
+        let narrow = self.pool.install(|| self.url.narrowest(state, reference));
+        let flow = self.strain_step() < self.wave_step();
         let slot = if flow {
             self.url.fastest(state, reference)
         } else {

@@ -1,5 +1,6 @@
-//! The inputs that fuzzing has collected, and those that failed once, through their targets: `fuzz/README.md`.
+//! The inputs that fuzzing has collected, through their targets: `fuzz/README.md`.
 
+#![cfg(feature = "fmi")]
 #![allow(unsafe_code)] // The targets call the C ABI and the functions of FMI.
 
 use std::path::{Path, PathBuf};

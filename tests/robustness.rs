@@ -152,6 +152,32 @@ fn impacts_beyond_the_speed_of_sound_run() {
     }
 }
 
+/// All work is done in the pool of the simulation: rayon's global pool, whose threads a host could not get rid of,
+/// is never started, not even to find out why a step has become too small.
+#[test]
+fn the_global_pool_is_left_alone() {
+    let mut s = block(&[
+        "numerics.smallest_step=0.5",
+        "numerics.reference_update=every_step",
+        "boundary.y_min.support=roller",
+        "boundary.y_max.velocity=[null, -1, null]",
+    ]);
+    let error = s.advance(1.9).expect_err("pressed flat");
+    assert!(
+        error.message().contains("the stable step fell to"),
+        "{error}"
+    );
+    for of in [Field::CauchyStress, Field::Pressure, Field::Velocity] {
+        field(&s, of);
+    }
+    let _ = (s.energies(), s.momenta(), s.state_hash());
+    s.restore(&s.snapshot()).expect("its own");
+    let global = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build_global();
+    global.expect("the first to start it");
+}
+
 /// A prescribed velocity needs a value at its own time only.
 #[test]
 fn prescribed_velocities_with_singular_ends() {

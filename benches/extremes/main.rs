@@ -40,8 +40,13 @@ struct Cli {
     /// Seconds after which a run is given up.
     #[arg(long, value_name = "S", default_value_t = 300)]
     limit: u64,
-    /// Folder of the results, made if missing.
-    #[arg(long, value_name = "DIR", default_value = "target/extremes")]
+    /// Folder of the results, made if missing; given by `cargo xtask extremes`.
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "target/extremes",
+        hide = true
+    )]
     out: PathBuf,
     /// Given by `cargo bench`.
     #[arg(long, hide = true)]

@@ -78,14 +78,14 @@ impl Monitor {
             // A support has worked at the start already, where it stops what moves.
             let own = |e: &Energies| stored(e) - e.external_work - e.heat_in;
             let grown = own(&now) - own(start);
-            self.growth = self.growth.max(grown / supplied);
-            self.ledger = self.ledger.max(now.closure_error.abs() / supplied);
+            self.growth = larger(self.growth, grown / supplied);
+            self.ledger = larger(self.ledger, now.closure_error.abs() / supplied);
             let given = before.numerical_dissipation - now.numerical_dissipation;
-            self.gain = self.gain.max(given / supplied);
+            self.gain = larger(self.gain, given / supplied);
         }
         let lost = before.entropy_production - now.entropy_production;
         if now.entropy_production != 0.0 {
-            self.loss = self.loss.max(lost / now.entropy_production.abs());
+            self.loss = larger(self.loss, lost / now.entropy_production.abs());
         }
         self.before = now;
     }
@@ -94,7 +94,9 @@ impl Monitor {
     pub fn findings(&self, simulation: &Simulation) -> Findings {
         let displacement = field(simulation, Field::Displacement);
         let largest = displacement.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-        let mut asymmetry = 0.0_f64;
+        // A body that has not moved is symmetric.
+        let scale = if largest == 0.0 { 1.0 } else { largest };
+        let mut asymmetry = 0.0;
         for (signs, images) in &self.images {
             for (a, image) in images.iter().enumerate() {
                 for c in 0..3 {
@@ -102,7 +104,7 @@ impl Monitor {
                         displacement[3 * a + c],
                         displacement[3 * *image as usize + c],
                     );
-                    asymmetry = asymmetry.max((signs[c] * u - v).abs() / largest);
+                    asymmetry = larger(asymmetry, (signs[c] * u - v).abs() / scale);
                 }
             }
         }
@@ -122,6 +124,11 @@ impl Monitor {
             most_j,
         }
     }
+}
+
+/// The larger value, or not a number if one of them is not.
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
 }
 
 /// Whether a value is larger than its limit, or no number at all.
@@ -171,9 +178,9 @@ fn checkerboard(roughness: &Roughness, simulation: &Simulation) -> f64 {
 
 fn range(values: &[f64]) -> (f64, f64) {
     let start = (f64::INFINITY, f64::NEG_INFINITY);
-    values
-        .iter()
-        .fold(start, |(low, high), v| (low.min(*v), high.max(*v)))
+    values.iter().fold(start, |(low, high), v| {
+        (-larger(-low, -v), larger(high, *v))
+    })
 }
 
 /// The particle that each is mapped to.

@@ -168,6 +168,8 @@ pub(super) struct Points<'a, 'o, 'p, E: Real> {
     pub v: [&'a [f64]; 3],
     /// Spacing tensors ([`spacings`]), where they bound the step.
     pub spacing: Option<[&'a [f64]; 6]>,
+    /// Whether the norm of the velocity gradient is asked for.
+    pub rate: bool,
     pub run: (usize, usize),
     pub out: &'o mut PointOutput<'p, E>,
 }
@@ -183,6 +185,17 @@ pub(super) struct Motion {
     pub rate2: f64,
 }
 
+/// A factor times grad_x v = grad_chi v f^-1, with f^-1 from f itself.
+#[inline(always)]
+pub(super) fn spatial_gradient<T: Lane>(
+    factor: T,
+    grad_v: &Mat3<T>,
+    f: &Mat3<T>,
+    cof_f: &Mat3<T>,
+) -> Mat3<T> {
+    scale9(factor / dot(f[0], cof_f[0]), &mat_mul_t(grad_v, cof_f))
+}
+
 impl<E: Real> Work for Points<'_, '_, '_, E> {
     type Output = std::result::Result<Motion, Breakdown>;
     #[inline(always)]
@@ -193,6 +206,7 @@ impl<E: Real> Work for Points<'_, '_, '_, E> {
             l,
             v,
             spacing,
+            rate,
             run,
             out,
             ..
@@ -210,14 +224,17 @@ impl<E: Real> Work for Points<'_, '_, '_, E> {
         for (at, a) in lanes_from::<T>(run) {
             let (l, v_r) = (load9::<T>(token, &l, a), T::load(token, volume, a));
 
-            // 1/2 grad_chi v f^-1, f^-1 from f itself.
             let f = load9::<T>(token, &kinematics.f, a);
             let cof_f = cofactor(&f);
-            let grad = load_slab9::<T>(token, &kept.grad_v, at);
-            let half_grad = scale9(half / dot(f[0], cof_f[0]), &mat_mul_t(&grad, &cof_f));
-            fastest.max(at, double_dot(&half_grad, &half_grad));
-            if let Some(out) = &mut block.half_grad {
-                store9(&half_grad, out, at);
+            if rate || block.half_grad.is_some() {
+                let grad = load_slab9::<T>(token, &kept.grad_v, at);
+                let half_grad = spatial_gradient(half, &grad, &f, &cof_f);
+                if rate {
+                    fastest.max(at, double_dot(&half_grad, &half_grad));
+                }
+                if let Some(out) = &mut block.half_grad {
+                    store9(&half_grad, out, at);
+                }
             }
 
             // Q = V_R P F_chi^T L and S = V_chi h L.

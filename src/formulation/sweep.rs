@@ -325,6 +325,8 @@ pub(super) struct Task<'a> {
     pub state: &'a State,
     pub reference: &'a Reference,
     pub spacing: Option<[&'a [f64]; 6]>,
+    /// Whether the largest velocity gradient is asked for.
+    pub rate: bool,
     /// Whether Venkatakrishnan's limiter is on.
     pub limited: bool,
     pub mode: u8,
@@ -376,6 +378,7 @@ impl<E: PairReal> Passes<'_, E> {
             l,
             v,
             spacing: task.spacing,
+            rate: task.rate,
             run,
             out: &mut out,
         })?;

@@ -15,6 +15,7 @@ use super::conduction::Conduction;
 use super::laws::{LawInputs, inadmissible};
 use super::passes::{
     AreaLengths, BoundSlope, Gradient, HalfSlope, Kinematics, VolumeRates, immovable, spacings,
+    spatial_gradient,
 };
 use super::riemann::{self, WaveSpeeds};
 use super::sweep::{Needs, Outputs, Sweep, Task};
@@ -85,7 +86,7 @@ pub struct Evaluation {
     pub dissipation: f64,
     /// Smallest |x_ab| lambda_ab over all pairs [m]: the stable step times the linear wave speed.
     pub length: f64,
-    /// Largest norm of a particle's spatial velocity gradient, |grad_x v| [1/s].
+    /// Largest norm of a particle's spatial velocity gradient, |grad_x v| [1/s], where it bounds the step.
     pub rate: f64,
     /// Longest time for which explicit conduction is stable [s].
     pub conduction_step: f64,
@@ -197,6 +198,7 @@ pub(super) struct Options {
     mode: u8,
     coefficient: f64,
     venkatakrishnan: bool,
+    strain_bound: bool,
     volume_dissipation: f64,
     linear: bool,
     pub(super) thermal: Option<Thermal>,
@@ -304,6 +306,7 @@ impl Url {
                 mode,
                 coefficient: numerics.dissipation_coefficient,
                 venkatakrishnan: numerics.limiter == Limiter::Venkatakrishnan,
+                strain_bound: numerics.strain_increment().is_finite(),
                 volume_dissipation: numerics.volume_dissipation,
                 linear,
                 thermal,
@@ -514,6 +517,8 @@ impl Url {
             state,
             reference,
             spacing: spacing.as_ref().map(Array::components),
+            // Only the last evaluation of a step bounds the next one.
+            rate: options.strain_bound && elapsed.is_none(),
             limited: options.venkatakrishnan,
             mode,
             speeds,
@@ -733,11 +738,7 @@ impl Url {
     pub fn fastest(&self, state: &State, reference: &Reference) -> usize {
         let rate2 = |slot: &usize| {
             let f = matrix(&state.f.get(*slot));
-            let cof = cofactor(&f);
-            let rate = scale9(
-                1.0 / dot(f[0], cof[0]),
-                &mat_mul_t(&self.grad_v(*slot), &cof),
-            );
+            let rate = spatial_gradient(1.0, &self.grad_v(*slot), &f, &cofactor(&f));
             double_dot(&rate, &rate)
         };
         (0..reference.layout.particles)

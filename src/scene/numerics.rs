@@ -122,12 +122,13 @@ impl Numerics {
         })
     }
 
-    /// Most that a step may strain or turn a particle, infinite without a limit.
+    /// Most that a step may strain or turn a particle, infinite without a limit, and where the step is fixed.
     ///
     /// Three stages take 8e-5 of its energy from a rotation of which a step makes as much as the default. The CFL
     /// condition knows waves but no flow: behind an impact it allows a step that turns a particle inside out.
     pub fn strain_increment(&self) -> f64 {
         match self.strain_increment {
+            _ if self.time_step.is_some() => f64::INFINITY,
             None => 0.25,
             Some(0.0) => f64::INFINITY,
             Some(increment) => increment,

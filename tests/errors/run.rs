@@ -97,7 +97,7 @@ fn steps() -> Vec<Entry> {
              numerics.strain_increment, <share>: refine the spacing or reduce the load",
         ])
         .call("an explosion", || {
-            block(&[r#"initial.velocity=["1e6*X", 0, 0]"#]).advance(1.0)
+            block(&["numerics.smallest_step=0.5", r#"body_force=["1e7*X", 0, 0]"#]).advance(1.0)
         })
         .call("a piston", || {
             block(&[

@@ -216,21 +216,23 @@ fn dictionaries(sh: &Shell) -> Result<()> {
 /// Makes the committed inputs the fewest that reach every place that the present ones, and those found, reach.
 fn minimise(sh: &Shell, programs: &Path, target: &str) -> Result<()> {
     let (program, found) = (programs.join(target), folder().join("found").join(target));
-    let (before, seeds) = (folder().join("before").join(target), seeds(sh, target)?);
+    let (fewest, seeds) = (folder().join("fewest").join(target), seeds(sh, target)?);
     let committed = Path::new("fuzz/corpus").join(target);
-    sh.remove_path(&before)?;
-    sh.create_dir(&before)?;
-    for input in sh.read_dir(&committed)? {
-        sh.copy_file(&input, &before)?;
-        sh.remove_path(&input)?;
-    }
+    sh.remove_path(&fewest)?;
+    sh.create_dir(&fewest)?;
     // A place counts once, however often it is passed.
     cmd!(
         sh,
-        "{program} -set_cover_merge=1 -use_counters=0 -max_len=2048 -timeout=10 {committed} {before} {found} {seeds}"
+        "{program} -set_cover_merge=1 -use_counters=0 -max_len=2048 -timeout=10 {fewest} {committed} {found} {seeds}"
     )
     .env("RAYON_NUM_THREADS", "1")
     .quiet()
     .run()?;
+    for input in sh.read_dir(&committed)? {
+        sh.remove_path(&input)?;
+    }
+    for input in sh.read_dir(&fewest)? {
+        sh.copy_file(&input, &committed)?;
+    }
     Ok(())
 }

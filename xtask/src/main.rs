@@ -30,8 +30,8 @@ const HELP: &str = "\
 Usage: cargo xtask <TASK>
 
 Tasks:
-  abi         Programs built against an earlier release run with this library; --freeze keeps header and
-              symbols of the present version (ffi-tests/abi/README.md)
+  abi         Programs built against an earlier release run with this library; --freeze keeps what
+              the present version promises (ffi-tests/abi/README.md)
   bench       Speed against accuracy: cases with reference solutions over resolution and numerics, as
               JSON, CSV and a report under target/bench/; --quick takes a minute (bench --help)
   counts      Instructions, memory, pair-updates and errors against those expected; --update makes the

@@ -88,7 +88,7 @@ fn no_features(sh: &Shell) -> Result<Tally> {
     Ok(Tally::of(
         cmd!(
             sh,
-            "cargo clippy --release --package urlsph --lib --no-default-features -- {strict}"
+            "cargo clippy --release --package urlsph --lib --tests --no-default-features -- {strict}"
         )
         .run(),
     ))

@@ -234,6 +234,17 @@ class View:
         return np.asarray(memory)
 
 
+def _log_record(r) -> LogRecord:
+    return LogRecord(
+        _LOG_LEVELS.get(r.level, str(r.level)),
+        _LOG_EVENTS.get(r.event, str(r.event)),
+        r.message.decode(),
+        r.error.contents.exception() if r.error else None,
+        r.time,
+        r.steps,
+    )
+
+
 class _Callbacks:
     """The callbacks as C sees them. What they raise is kept until the call is back."""
 
@@ -255,16 +266,7 @@ class _Callbacks:
             return None
 
         def on_log(record, _):
-            r = record.contents
-            read = LogRecord(
-                _LOG_LEVELS.get(r.level, str(r.level)),
-                _LOG_EVENTS.get(r.event, str(r.event)),
-                r.message.decode(),
-                r.error.contents.exception() if r.error else None,
-                r.time,
-                r.steps,
-            )
-            guard(lambda: log(read))
+            guard(lambda: log(_log_record(record.contents)))
 
         def on_progress(p, _):
             p = p.contents
