@@ -6,6 +6,7 @@ use crate::formulation::url::{Evaluation, Plastic};
 /// Energies [J] and entropies [J/K]. Works, heats and dissipations are accumulated since time 0 with
 /// the weights of the time integrator. What a scene does not have is 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Energies {
     /// Kinetic energy, sum of m v.v / 2.
     pub kinetic: f64,
@@ -41,6 +42,7 @@ pub struct Energies {
 
 /// Momenta of the whole body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Momenta {
     /// Linear momentum [kg m/s].
     pub linear: [f64; 3],
@@ -50,6 +52,7 @@ pub struct Momenta {
 
 /// What a patch feels and does; areas and normals of the initial configuration.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Resultant {
     /// Force of the surroundings on the body through this patch [N]: loads and support reactions.
     pub force: [f64; 3],
@@ -63,6 +66,7 @@ pub struct Resultant {
 
 /// Heat through a patch and its temperature; areas of the initial configuration.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct HeatResultant {
     /// Heat that flows into the body through this patch [W]: flux, convection, and what a
     /// prescribed temperature draws.
@@ -75,6 +79,7 @@ pub struct HeatResultant {
 
 /// What a plane of contact does to the body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct ContactResultant {
     /// Force of the plane on the body now [N], without the impulses of impacts.
     pub force: [f64; 3],

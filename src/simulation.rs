@@ -81,6 +81,7 @@ pub enum Control {
 
 /// What an observer sees after each time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Simulated time [s].
     pub time: f64,
@@ -98,6 +99,7 @@ pub struct Progress {
 
 /// Motion of a probe, and its temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct ProbeMotion {
     /// Displacement [m].
     pub displacement: [f64; 3],
