@@ -50,6 +50,9 @@ pub mod fmu;
 mod formulation;
 mod integrator;
 mod kernel;
+#[cfg(keys)]
+#[allow(unsafe_code)] // Functions of the C library.
+mod keys;
 mod lane;
 mod layout;
 pub mod ledger;

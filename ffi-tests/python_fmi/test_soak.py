@@ -4,6 +4,7 @@ The environment variable URLSPH_SOAK multiplies what is done; with 100 it is 2,0
 """
 
 import _ctypes
+import ctypes
 import os
 import shutil
 
@@ -16,6 +17,14 @@ LOADS = 20 * FACTOR
 # nothing frees when a library is unloaded.
 LEFT = 40_000
 CALLS = 10_000 * FACTOR
+
+
+def next_key():
+    """The first free of the 1,024 keys of thread-local storage that a process has."""
+    libc, key = ctypes.CDLL(None), ctypes.c_uint()
+    assert libc.pthread_key_create(ctypes.byref(key), None) == 0
+    assert libc.pthread_key_delete(key) == 0
+    return key.value
 
 
 def is_mapped(folder):
@@ -42,8 +51,10 @@ def test_loads_at_fresh_paths(unpacked, version, tmp_path):
     warm = max(LOADS // 10, 5)
     live(0, warm)
     threads, memory = threads_and_memory()
+    key = next_key()
     live(warm, warm + LOADS)
     threads_after, memory_after = threads_and_memory()
+    assert next_key() == key, "a load leaves a key of thread-local storage"
     growth = memory_after - memory
     tolerance = 1e6 + LEFT * LOADS
     print(f"{LOADS} loads: {threads} -> {threads_after} threads; memory grew by {growth} bytes, tolerance {tolerance:g}")
